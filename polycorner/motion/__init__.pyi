@@ -13,7 +13,7 @@ from .contacts import (
 from .events import Event, EventKind
 from .friction import ConvexPolygon, ConvexSet, CutDisc, Disc, Ellipse, Interval
 from .mechanics import MechanicalSystem, State
-from .noise import Noise, Solver
+from .noise import MotionOptions, Noise, Solver
 from .random_functions import random_field, random_signal
 from .rotations import angular_velocity, rotational_energy
 from .simulation import simulate, step
@@ -35,6 +35,7 @@ __all__ = [
     "Friction",
     "Interval",
     "MechanicalSystem",
+    "MotionOptions",
     "Noise",
     "PairFriction",
     "Solver",

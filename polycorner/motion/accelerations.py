@@ -11,7 +11,8 @@ from scipy.optimize import linprog
 
 from polycorner.checks import instance, refuse
 from polycorner.motion.formulation import moment
-from polycorner.motion.mechanics import OVERLAP, State
+from polycorner.motion.mechanics import State
+from polycorner.motion.noise import OPTIONS
 from polycorner.motion.system import System
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -179,8 +180,9 @@ class _Problem:
         now = moment(system.formulation, system.parameters + state.time, q, v)
         gaps, rows, hessians = system.polyhedron.bundle.evaluate(q, 2)
         rates = rows @ v
-        still = OVERLAP * np.linalg.norm(rows * scales, axis=-1) * np.linalg.norm(v / scales)
-        touching = np.flatnonzero(gaps[:m] <= OVERLAP * scales.min())
+        sizes = np.linalg.norm(rows * scales, axis=-1)
+        still = OPTIONS.overlap * sizes * np.linalg.norm(v / scales)
+        touching = np.flatnonzero(gaps[:m] <= OPTIONS.overlap * scales.min())
         for g in touching:
             if rates[g] < -still[g]:
                 expected = f"a velocity at which contact {system.contacts[g]!r} does not close"

@@ -12,9 +12,6 @@ from polycorner.motion.noise import Solver
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, Value
 
-PILES = Solver(tolerance=1e-4, sweeps=62)  # default for more than two bodies
-OVERLAP = 1e-4  # scaled depth up to which a start counts as touching: what a step may leave
-
 
 @dataclass(frozen=True, eq=False)
 class State(Checked):
@@ -87,4 +84,4 @@ class MechanicalSystem(Value, ABC):
         and a slip of 1e-4 of the speed of a drum's wall is 2 mm in four hours.
         """
         piles = self.bodies.count > 2 and self.bodies.contacts is not None
-        return PILES if piles else Solver()
+        return Solver.piles() if piles else Solver()

@@ -8,6 +8,59 @@ from polycorner.values import Checked
 
 
 @dataclass(frozen=True)
+class MotionOptions(Checked):
+    """Numbers that decide in a motion what touches, what is slow, and how short steps become.
+
+    Lengths are in the scale units of the manifold, except for ``crowd_travel``.
+
+    Attributes
+    ----------
+    touching, parting : float
+        Gap up to which a contact is made, and beyond which it is lost.
+    zero_gap : float
+        Depth up to which a gap counts as zero.
+    overlap : float
+        Depth up to which the start of a motion counts as touching: what a step may leave.
+    detection : float
+        Gap up to which contacts between bodies are looked for, at least.
+    bending : float
+        Depth to which a gap may close by its curvature within a step.
+    slow_travel, slow_travel_kicked, slow_bounce : float
+        Travel in a step up to which an impact is slow, so that it need not be located: a plastic
+        one, without and with random impulses, and one that bounces.
+    crowd_travel : float
+        The same for a plastic impact in a crowd, over the reach of bodies.
+    crowd_overlap : float
+        Overlap that is left as it is in a crowd whose contacts are swept.
+    shortest_part : float
+        Part of a step to which it is halved where contacts sink in.
+    dependent : float
+        Sine of the angle to other equations below which one follows from them.
+    """
+
+    touching: float = 1e-7
+    parting: float = 100.0 * 1e-7
+    zero_gap: float = 1e-9
+    overlap: float = 1e-4
+    detection: float = 1e-2
+    bending: float = 1e-4
+    slow_travel: float = 1e-6
+    slow_travel_kicked: float = 1e-4
+    slow_bounce: float = 1e-6
+    crowd_travel: float = 0.01
+    crowd_overlap: float = 1e-3
+    shortest_part: float = 1.0 / 4096.0
+    dependent: float = 1e-4
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            real(name, value, above=0, below=1)
+
+
+OPTIONS = MotionOptions()  # where no solver is given
+
+
+@dataclass(frozen=True)
 class Solver(Checked):
     """How exactly the inclusion of each step is solved.
 
@@ -33,6 +86,8 @@ class Solver(Checked):
     threads : int, optional
         How many threads do a step together; default 1.  Results are the same, bit for bit, for any
         number.  It pays for islands of many bodies, or many islands, and on idle processors.
+    options : MotionOptions, optional
+        What counts as touching, as slow and as short.
     """
 
     tolerance: float = 1e-8
@@ -40,6 +95,17 @@ class Solver(Checked):
     refine: bool = True
     crowd_sweeps: int = 0
     threads: int = 1
+    options: MotionOptions = field(default=OPTIONS, repr=False)
+
+    @classmethod
+    def piles(cls) -> "Solver":
+        """Return the solver of more than two bodies that touch each other."""
+        return cls(tolerance=1e-4, sweeps=62)
+
+    @classmethod
+    def crowd(cls, crowd_sweeps: int) -> "Solver":
+        """Return the solver of thousands of bodies, with so many sweeps over each large island."""
+        return cls(tolerance=1e-4, crowd_sweeps=crowd_sweeps)
 
     def __post_init__(self) -> None:
         real("tolerance", self.tolerance, above=0, below=1)
@@ -47,6 +113,7 @@ class Solver(Checked):
         instance("refine", self.refine, bool)
         whole("crowd_sweeps", self.crowd_sweeps, least=0)
         whole("threads", self.threads, least=1)
+        instance("options", self.options, MotionOptions)
 
 
 @dataclass(frozen=True)

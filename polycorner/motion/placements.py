@@ -3,7 +3,7 @@
 import numpy as np
 
 from polycorner.formulas.bundles import Bundle
-from polycorner.motion.mechanics import OVERLAP
+from polycorner.motion.noise import OPTIONS
 from polycorner.polyhedra.faces import project
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.quotients import Quotient
@@ -23,7 +23,7 @@ def check_contacts(polyhedron: Polyhedron, q: Array) -> None:
         return
     gaps = polyhedron.values(q)
     worst = tuple(map(int, np.unravel_index(int(np.argmin(gaps)), gaps.shape)))
-    if gaps[worst] < -OVERLAP * min(polyhedron.manifold.scales):
+    if gaps[worst] < -OPTIONS.overlap * min(polyhedron.manifold.scales):
         msg = (
             f"q: expected a placement without overlap; contact {polyhedron.names[worst[-1]]!r}"
             f"{_which(worst)} overlaps by {-gaps[worst]:.6g}"
@@ -48,7 +48,7 @@ def check_equations(polyhedron: Polyhedron, q: Array) -> None:
                 f"it is the direction of its force; got zero"
             )
             raise ValueError(msg)
-        if not abs(value) <= OVERLAP * sizes[at]:
+        if not abs(value) <= OPTIONS.overlap * sizes[at]:
             msg = f"q: expected equation {name!r}{_which(at)} to hold; its value is {value:.6g}"
             raise ValueError(msg)
 
@@ -62,7 +62,7 @@ def check_velocities(polyhedron: Polyhedron, q: Array, v: Array) -> None:
     rates = (slopes @ speeds[..., None])[..., 0]
     most = np.linalg.norm(slopes, axis=-1) * np.linalg.norm(speeds, axis=-1)[..., None]
     for at in np.ndindex(rates.shape):
-        if abs(rates[at]) > OVERLAP * most[at]:
+        if abs(rates[at]) > OPTIONS.overlap * most[at]:
             msg = (
                 f"v: expected velocities along equation {polyhedron.equation_names[at[-1]]!r}"
                 f"{_which(at)}; they change it at the rate {rates[at]:.6g}"

@@ -12,7 +12,7 @@ import numpy as np
 
 from polycorner import forms
 from polycorner.checks import refuse
-from polycorner.motion.engine.arrays import CONTACTS, STEPS, State, declarations
+from polycorner.motion.engine.arrays import CONTACTS, STEPS, EngineState, declarations
 from polycorner.motion.engine.driver import Engine
 from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.events import EventKind, EventTable, joined
@@ -51,7 +51,7 @@ def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
         "counts": (0, last),
         "elapsed": (0.0, engine.dt),
     }
-    for name, declared in declarations(State).items():
+    for name, declared in declarations(EngineState).items():
         if name in NOW - arrays.keys():
             continue
         kind = "f" if declared.kind is np.float64 else "i"

@@ -67,7 +67,7 @@ from polycorner.kinds import checked
 from polycorner.motion.bodies import IdenticalBodies
 from polycorner.motion.formulation import moment
 from polycorner.motion.mechanics import MechanicalSystem, State
-from polycorner.motion.noise import Noise, Solver
+from polycorner.motion.noise import OPTIONS, Noise, Solver
 from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -255,6 +255,11 @@ def _parameters(
         "solver.sweeps": int(solver.sweeps),
         "solver.refine": solver.refine,
         **({"solver.crowd_sweeps": int(solver.crowd_sweeps)} if solver.crowd_sweeps else {}),
+        **{
+            f"solver.options.{name}": float(value)
+            for name, value in vars(solver.options).items()
+            if value != getattr(OPTIONS, name)
+        },
         "state.time": float(state.time),
         **{f"state.{a}": fingerprint(getattr(state, a)) for a in ("q", "v", "sticking")},
     }

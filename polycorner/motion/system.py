@@ -15,7 +15,8 @@ from polycorner.kinds import check_fields, checked
 from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
 from polycorner.motion.contacts import ContactFamily, Friction, position_of, slip_text
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
-from polycorner.motion.mechanics import OVERLAP, MechanicalSystem, State
+from polycorner.motion.mechanics import MechanicalSystem, State
+from polycorner.motion.noise import OPTIONS
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
@@ -277,7 +278,7 @@ class System(MechanicalSystem):
         """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
         check_contacts(self.polyhedron, q)
         check_equations(self.polyhedron, q)
-        deep = -OVERLAP * min(self.manifold.scales)
+        deep = -OPTIONS.overlap * min(self.manifold.scales)
         gap, (i, j), name = self.bodies.least_pair_gap(q.reshape(self.count, -1))
         if gap < deep:
             msg = (

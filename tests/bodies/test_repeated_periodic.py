@@ -132,8 +132,8 @@ def test_neighbours_are_all_pairs_of_near_images(box):
     q = scattered(rng, 12, box, 1.0)
     engine = start(system, system.state(q), 1e-3)
     engine.advance(1)
-    count = int(engine.work.list_status[0])
-    listed = [tuple(pair) for pair in engine.work.neighbours[:count].tolist()]
+    count = int(engine.work.neighbours.status[0])
+    listed = [tuple(pair) for pair in engine.work.neighbours.pairs[:count].tolist()]
     one, two = np.triu_indices(12, 1)
     near = apart(q, box) < 1.0 * (1 + 0.3)
     assert len(set(listed)) == len(listed)
@@ -176,7 +176,7 @@ def test_threads_and_strips_go_around_the_box():
     for engine in engines:
         engine.advance(60)
     single, several = engines
-    strips, around = single.work.strips.tolist()
+    strips, around = single.work.crowd.strips.tolist()
     assert around
     assert strips > 4
     assert strips % 2 == 0

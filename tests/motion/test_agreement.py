@@ -375,7 +375,7 @@ def drum_solution(drum, engine, before):
     flags = zip(before["keys"][:known], before["pair_flags"][:known, 0], strict=True)
     stuck = {CONTACTS[key % len(CONTACTS)]: bool(flag) for key, flag in flags}
     states = before["q"], before["v"], engine.dt, before["sticks"], stuck
-    problem = drum_problem(drum, *states, engine.work.kick.ravel())
+    problem = drum_problem(drum, *states, engine.work.mid.kick.ravel())
     normal, rubs = np.zeros(len(CONTACTS)), np.zeros((len(CONTACTS), 2))
     count = int(motion.counts[0])
     for key, press in zip(motion.keys[:count], motion.pair_impulse[:count], strict=True):
@@ -386,7 +386,7 @@ def drum_solution(drum, engine, before):
     static = [*one, *one, *[Disc(drum.rubbing[0])] * len(CONTACTS)]
     problem = with_turned(problem, static, velocity)
     if natural_residual(problem, velocity, normal, impulses) >= SAME:  # solved twice, then
-        problem = drum_problem(drum, *states, engine.work.kick.ravel())
+        problem = drum_problem(drum, *states, engine.work.mid.kick.ravel())
         first, turned = None, problem
         while first is None or turned is not problem:
             problem = turned

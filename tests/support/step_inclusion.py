@@ -7,12 +7,13 @@ from numpy.typing import NDArray
 
 from polycorner.motion.formulation import moment
 from polycorner.motion.friction import ConvexSet
-from polycorner.motion.mechanics import OVERLAP, State
+from polycorner.motion.mechanics import State
+from polycorner.motion.noise import OPTIONS
 from polycorner.motion.system import System
 from polycorner.spaces.manifold import Array
 
-CLOSED = 1e-9  # scaled depth up to which a gap counts as zero
-BEND = OVERLAP  # scaled depth beyond which no gap may close by its curvature within a step
+CLOSED = OPTIONS.zero_gap
+BEND = OPTIONS.bending  # scaled depth beyond which no gap may close by its curvature within a step
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,35 @@
 
 from collections.abc import Mapping
 from math import prod
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 
-from polycorner.motion.engine.arrays import Declaration, Log, Model, State, Work, declarations
+from polycorner.motion.engine.arrays import (
+    OWN,
+    Declaration,
+    EngineState,
+    Log,
+    Model,
+    Work,
+    declarations,
+)
 from polycorner.motion.engine.sizes import Sizes
 
 LINE = 8  # numbers in a cache line, into which whole vectors fit
 
-Record = TypeVar("Record", Model, State, Work, Log)
+Record = TypeVar("Record", Model, EngineState, Log)
+
+
+def workspace(sizes: Sizes) -> Work:
+    """Return a new workspace."""
+    return Work(**{name: allocate(part, sizes) for name, part in get_type_hints(Work).items()})
+
+
+def own_workspace(work: Work, sizes: Sizes) -> Work:
+    """Return the workspace of a further thread, which shares all but what is in the making."""
+    parts = get_type_hints(Work)
+    return work._replace(**{name: allocate(parts[name], sizes) for name in OWN})
 
 
 def allocate(record: type[Record], sizes: Sizes) -> Record:

@@ -12,7 +12,7 @@ import numpy as np
 
 from polycorner.motion.engine.sizes import Sizes
 
-# Indices into `State.counts` and `State.sums`; the dissipation by cause follows DISSIPATED.
+# Indices into `counts` and `sums` of the state; the dissipation by cause follows DISSIPATED.
 CONTACTS, STEPS, UNSOLVED, SWEEPS, NEWTON_STEPS, ISLANDS, PARTS = range(7)
 SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = range(6)
 
@@ -24,6 +24,10 @@ SETTLED, SOLVED, CHANGED = range(3)
 
 # The velocity bound of a gap: as it is; an error so small that it may be left; raised by curvature.
 PLAIN, SMALL, BENT = range(3)
+
+# Of the strips of a crowd: their number; whether the first follows the last; whether friction that
+# is apart from the contact that presses on it looks at its impulse.
+STRIPS, AROUND, WATCHED = range(3)
 
 # What follows if an island is not solved: nothing; shorter steps; halves of this part of a step.
 LAST, DIVIDED, HALVED = range(3)
@@ -127,6 +131,15 @@ class Model(NamedTuple):
     tolerance: Annotated[Any, real()]  # of residuals, relative to speeds
     sweeps: Annotated[Any, whole()]  # most Gauss-Seidel sweeps over an island
     refines: Annotated[Any, whole()]  # whether bodies take shorter steps where they need them
+    touching: Annotated[Any, real()]  # lengths of `MotionOptions`
+    parting: Annotated[Any, real()]
+    zero_gap: Annotated[Any, real()]
+    detection: Annotated[Any, real()]
+    crowd_overlap: Annotated[Any, real()]
+    bending: Annotated[Any, real()]  # its other numbers
+    slow_bounce: Annotated[Any, real()]
+    shortest_part: Annotated[Any, real()]
+    dependent: Annotated[Any, real()]
     near: Annotated[Any, real()]  # scaled travel in a step up to which a plastic impact is slow
     near_many: Annotated[Any, real()]  # the same for bodies in a crowd
     constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
@@ -143,7 +156,7 @@ class Model(NamedTuple):
     give_way: Annotated[Any, whole()]  # address: lets other threads run; 0: nothing does
 
 
-class State(NamedTuple):
+class EngineState(NamedTuple):
     """State of the motion: together these arrays determine its future, bit for bit."""
 
     q: Annotated[Any, real("N k")]  # coordinates
@@ -176,11 +189,18 @@ class State(NamedTuple):
     sums: Annotated[Any, real("D+5")]
 
 
-class Work(NamedTuple):
-    """Workspace of a step."""
+class MannerWork(NamedTuple):
+    """How the present step, or part of one, is solved."""
 
-    scratch: Annotated[Any, real("W")]  # arguments and results of kernels
-    q_mid: Annotated[Any, real("N k")]  # coordinates at the midpoint of the step
+    near: Annotated[Any, real("1")]  # which of the two distances holds for the bodies at hand
+    located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
+    remedy: Annotated[Any, whole("1")]  # for islands that are not solved: LAST, DIVIDED or HALVED
+
+
+class MidpointWork(NamedTuple):
+    """Bodies at the midpoint of the step."""
+
+    q: Annotated[Any, real("N k")]  # coordinates at the midpoint of the step
     force: Annotated[Any, real("N k")]  # impulse of all forces in the step
     applied: Annotated[Any, real("N k")]  # that of the applied forces among them
     kick: Annotated[Any, real("N k")]  # random impulse
@@ -190,65 +210,109 @@ class Work(NamedTuple):
     load: Annotated[Any, real("N F")]  # known normal impulse
     gap: Annotated[Any, real("N m", initial=np.inf)]
     gradient: Annotated[Any, real("N m K")]  # of the gaps
-    q_next: Annotated[Any, real("N k")]  # prediction for the next midpoint
-    gap_next: Annotated[Any, real("N m")]  # gaps there
-    gradient_next: Annotated[Any, real("N m K")]
-    pair_gap_next: Annotated[Any, real("G")]
-    q_path: Annotated[Any, real("N k")]  # coordinates on the way
-    gap_path: Annotated[Any, real("N m")]  # gaps there
-    gradient_path: Annotated[Any, real("N m K")]
-    way_gap: Annotated[Any, real("6 Y")]  # gaps of a body or of two, at places on the way
-    way_rate: Annotated[Any, real("6 Y")]  # their rates
+    mass: Annotated[Any, real("N k K")]
+
+
+class VelocityWork(NamedTuple):
+    """Velocities of bodies in the step."""
+
+    old: Annotated[Any, real("N K")]  # velocities before the step
+    free: Annotated[Any, real("N K")]  # velocities after forces alone
+    new: Annotated[Any, real("N K")]  # velocities after the step
+    rest: Annotated[Any, real("N K")]  # velocities of bodies at which they would be at rest
+
+
+class BodyWork(NamedTuple):
+    """The condition of bodies in the step."""
+
     waits: Annotated[Any, whole("N")]  # whether a body is left as it is for the time being
-    joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
-    near: Annotated[Any, real("1")]  # which of the two distances holds for the bodies at hand
-    located: Annotated[Any, whole("1")]  # whether contacts act only where bodies are
-    remedy: Annotated[Any, whole("1")]  # for islands that are not solved: LAST, DIVIDED or HALVED
     awake: Annotated[Any, whole("N")]
     apart: Annotated[Any, whole("N")]  # whether surroundings are known to be far from a body
     touched: Annotated[Any, whole("N")]  # 0: by nothing; 1: by surroundings only; 2: by bodies
     evaluated: Annotated[Any, whole("N")]  # whether forces are those of this step
     speed: Annotated[Any, real("N")]
     island_speed: Annotated[Any, real("N")]  # largest velocity in the body's island
-    island_residual: Annotated[Any, real("N")]  # of the island that a body represents
-    stage: Annotated[Any, whole("N")]  # of the island that a body represents: SETTLED, ...
-    curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
-    parent: Annotated[Any, whole("N")]  # in the union-find forest
-    column: Annotated[Any, whole("N")]  # of a body that is searched for neighbours
-    ordered: Annotated[Any, whole("N")]  # bodies by columns and along them, as listed last
-    v_old: Annotated[Any, real("N K")]  # velocities before the step
-    v_free: Annotated[Any, real("N K")]  # velocities after forces alone
-    v_new: Annotated[Any, real("N K")]  # velocities after the step
-    v_rest: Annotated[Any, real("N K")]  # velocities of bodies at which they would be at rest
     v_mean: Annotated[Any, real("N k")]  # mean velocities of the step
-    former_force: Annotated[Any, real("N k")]  # `force` with the mean velocities before
+    former_force: Annotated[Any, real("N k")]  # forces with the mean velocities before
+
+
+class AheadWork(NamedTuple):
+    """Bodies at the next midpoint, as predicted."""
+
+    q: Annotated[Any, real("N k")]  # prediction for the next midpoint
+    gap: Annotated[Any, real("N m")]  # gaps there
+    gradient: Annotated[Any, real("N m K")]
+
+
+class PathWork(NamedTuple):
+    """A body at a place on its way."""
+
+    q: Annotated[Any, real("N k")]  # coordinates on the way
+    gap: Annotated[Any, real("N m")]  # gaps there
+    gradient: Annotated[Any, real("N m K")]
+
+
+class SleepWork(NamedTuple):
+    """What keeps bodies at rest, and wakes them."""
+
     neighbour_impulse: Annotated[Any, real("N k")]
     disturbed: Annotated[Any, whole("N")]  # whether a sleeper's contacts changed
     proof_friction: Annotated[Any, real("N F 2")]  # impulses that prove rest
     proof_normal: Annotated[Any, real("N m")]
-    rested: Annotated[Any, whole("N")]  # `State.rests` before the step
-    own_block: Annotated[Any, whole("m")]  # block of each gap of the body at hand, or -1
-    equation_rows: Annotated[Any, real("m k")]  # their gradients, made orthonormal with M^-1
-    island_start: Annotated[Any, whole("N+1")]  # in `order`, for the body that represents it
+    rested: Annotated[Any, whole("N")]  # `EngineState.rests` before the step
+
+
+class IslandWork(NamedTuple):
+    """Islands of touching bodies, each told by the body that represents it."""
+
+    joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
+    residual: Annotated[Any, real("N")]  # of the island that a body represents
+    stage: Annotated[Any, whole("N")]  # of the island that a body represents: SETTLED, ...
+    curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
+    parent: Annotated[Any, whole("N")]  # in the union-find forest
+    start: Annotated[Any, whole("N+1")]  # in `BlockWork.order`, for the body that represents it
     cursor: Annotated[Any, whole("N+1")]
-    neighbours: Annotated[Any, whole("P 2")]
-    list_status: Annotated[Any, whole("3")]  # numbers of neighbours; whether valid; of contacts
+    unsorted: Annotated[Any, whole("B")]  # what is to be ordered by strips
+
+
+class NeighbourWork(NamedTuple):
+    """Pairs of bodies that may meet within some steps."""
+
+    column: Annotated[Any, whole("N")]  # of a body that is searched for neighbours
+    ordered: Annotated[Any, whole("N")]  # bodies by columns and along them, as listed last
+    pairs: Annotated[Any, whole("P 2")]
+    status: Annotated[Any, whole("3")]  # numbers of neighbours; whether valid; of contacts
     examined: Annotated[Any, whole("P")]  # whether a pair was examined in this step
     least_gap: Annotated[Any, real("P")]  # of a pair at the midpoint; 0: not known
-    listed_position: Annotated[Any, real("N 2")]  # positions when the list was made
-    listed_travel: Annotated[Any, real("1")]  # how far bodies may move in a step, as listed
+    position: Annotated[Any, real("N 2")]  # positions when the list was made
+    travel: Annotated[Any, real("1")]  # how far bodies may move in a step, as listed
+    meets: Annotated[Any, whole("P")]  # how many small gaps of a pair were counted
+
+
+class PairWork(NamedTuple):
+    """Contacts between bodies in the step."""
+
     contact: Annotated[Any, whole("C 3")]  # body, body, gap
-    contact_gap: Annotated[Any, real("C")]
-    contact_before: Annotated[Any, whole("C")]  # index in the list of the last step, or -1
-    contact_impulse: Annotated[Any, real("C T+1")]  # initial impulses
-    contact_gradient: Annotated[Any, real("C 2*K")]
-    block_bodies: Annotated[Any, whole("B 2")]  # the second is -1 for the surroundings
-    block_rows: Annotated[Any, whole("B")]  # rows of friction; 0 for a unilateral contact
+    gap: Annotated[Any, real("C")]
+    before: Annotated[Any, whole("C")]  # index in the list of the last step, or -1
+    impulse: Annotated[Any, real("C T+1")]  # initial impulses
+    gradient: Annotated[Any, real("C 2*K")]
+    sort_keys: Annotated[Any, whole("S")]
+    ranked: Annotated[Any, whole("C")]  # contacts between bodies by key
+    block_of: Annotated[Any, whole("C")]  # block of each, or -1
+    met: Annotated[Any, whole("C")]  # whether a contact of the last step is found in this one
+
+
+class BlockWork(NamedTuple):
+    """Blocks of the step: what acts on bodies, and how."""
+
+    bodies: Annotated[Any, whole("B 2")]  # the second is -1 for the surroundings
+    rows: Annotated[Any, whole("B")]  # rows of friction; 0 for a unilateral contact
     bilateral: Annotated[Any, whole("B")]  # whether a block is an equation
     pressing: Annotated[Any, whole("B")]  # block of the contact that presses, or -1
-    block_set: Annotated[Any, whole("B")]  # set of admissible friction
+    set: Annotated[Any, whole("B")]  # set of admissible friction
     origin: Annotated[Any, whole("B 4")]  # kind, body or contact, gap or friction; touches
-    block_load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
+    load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
     bound: Annotated[Any, whole("B")]  # of a gap: PLAIN, SMALL or BENT
     offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
     before: Annotated[Any, real("B 2")]  # J v before the step
@@ -259,10 +323,22 @@ class Work(NamedTuple):
     delassus: Annotated[Any, real("B 5")]  # W = J M^-1 J': W00, W01, W11; rho = 1 / norm; norm
     impulse: Annotated[Any, real("B 2")]
     order: Annotated[Any, whole("B")]  # blocks, island after island
-    mass: Annotated[Any, real("N k K")]
-    reversed: Annotated[Any, whole("B")]  # whether slip changed direction in this step
     bounces: Annotated[Any, whole("B")]  # whether a contact bounces
+    entry: Annotated[Any, whole("B")]  # of a block's two bodies, or -1
+
+
+class EventWork(NamedTuple):
+    """What happened to the contacts of blocks in the step."""
+
     release: Annotated[Any, real("B")]  # when its normal impulse would vanish
+    happened: Annotated[Any, whole("B")]  # event of a block, or -1
+    time: Annotated[Any, real("B")]
+
+
+class SearchWork(NamedTuple):
+    """Iterates of the solution of islands, block by block."""
+
+    reversed: Annotated[Any, whole("B")]  # whether slip changed direction in this step
     best: Annotated[Any, real("B 2")]  # impulses of the least residual; Newton direction
     initial: Annotated[Any, real("B 2")]  # impulses before an equilibrium was sought
     rigid: Annotated[Any, real("B 2")]  # impulses before a continuation
@@ -274,14 +350,11 @@ class Work(NamedTuple):
     along: Annotated[Any, real("B")]  # J dv of a block's first row
     schur_row: Annotated[Any, real("B 2*K")]  # normal after elimination of friction
     load_slope: Annotated[Any, real("B 2")]  # change of friction with its load
-    body_matrix: Annotated[Any, real("k k")]
-    body_vector: Annotated[Any, real("k")]
-    rest_velocity: Annotated[Any, real("k")]
-    slip: Annotated[Any, real("2")]
-    image: Annotated[Any, real("12")]  # of a projection or barrier, with derivatives
-    sort_keys: Annotated[Any, whole("S")]
-    members: Annotated[Any, whole("N")]  # bodies of an island
-    number: Annotated[Any, whole("N")]  # number of a body in its island
+
+
+class GraphWork(NamedTuple):
+    """Graph of the bodies of an island, from which one after the other is eliminated."""
+
     listed: Annotated[Any, whole("N")]  # bodies of an island before they are ordered
     degree: Annotated[Any, whole("N")]  # of each: how many neighbours are left
     first_of_degree: Annotated[Any, whole("N")]  # one of those of each degree
@@ -290,42 +363,97 @@ class Work(NamedTuple):
     link: Annotated[Any, whole("2*Q+1 2")]  # neighbour, next link
     link_status: Annotated[Any, whole("2")]  # first link that is free, number of links used
     mark: Annotated[Any, whole("N")]  # the vertex by which one was seen last
+
+
+class MatrixWork(NamedTuple):
+    """Matrix of an island, and the order of its bodies."""
+
+    members: Annotated[Any, whole("N")]  # bodies of an island
+    number: Annotated[Any, whole("N")]  # number of a body in its island
     place: Annotated[Any, whole("N")]  # in the order of elimination
     row_start: Annotated[Any, whole("N+1")]  # first entry of each row
     columns: Annotated[Any, whole("Q+1")]  # of entries
-    entry: Annotated[Any, whole("B")]  # of a block's two bodies, or -1
-    island_vector: Annotated[Any, real("N*K")]
-    matrix: Annotated[Any, real("M")]  # of an island, block by block
-    ranked: Annotated[Any, whole("C")]  # contacts between bodies by key
-    block_of: Annotated[Any, whole("C")]  # block of each, or -1
-    meets: Annotated[Any, whole("P")]  # how many small gaps of a pair were counted
-    found: Annotated[Any, whole("V")]  # contacts that an item finds; from where on it adds them
-    met: Annotated[Any, whole("C")]  # whether a contact of the last step is found in this one
-    happened: Annotated[Any, whole("B")]  # event of a block, or -1
-    event_time: Annotated[Any, real("B")]
-    booked: Annotated[Any, real("V D+5")]  # `State.sums` of an item
-    finite: Annotated[Any, whole("1")]  # whether velocities and gaps are numbers
+    vector: Annotated[Any, real("N*K")]
+    entries: Annotated[Any, real("M")]  # of an island, block by block
+
+
+class CrowdWork(NamedTuple):
+    """Contacts of crowds in compact form, and the strips that they are divided into."""
+
     shift: Annotated[Any, real("N K")]  # by which bodies of crowds move apart
     mass_root: Annotated[Any, real("N k K")]  # U of M^-1 = U U'
     unit_velocity: Annotated[Any, real("N K")]  # w of the velocities v_free + U w
     unit_shift: Annotated[Any, real("N K")]  # by which bodies move apart, in coordinates w
-    compact: Annotated[Any, whole("B 4")]  # contacts of a crowd: FIRST, ...
-    compact_numbers: Annotated[Any, real("B 8")]  # NORMAL, ...
-    compact_across: Annotated[Any, real("B 5")]  # ACROSS, ...
-    compact_rows: Annotated[Any, real("B 2 2*K")]  # J U of the normal, and of the slip
-    compact_across_rows: Annotated[Any, real("B 2*K")]  # the same of the slip across
-    compact_order: Annotated[Any, whole("B")]  # twice a block, and whether friction follows
-    strips: Annotated[Any, whole("2")]  # their number; whether the first follows the last
+    contact: Annotated[Any, whole("B 4")]  # contacts of a crowd: FIRST, ...
+    numbers: Annotated[Any, real("B 8")]  # NORMAL, ...
+    across: Annotated[Any, real("B 5")]  # ACROSS, ...
+    rows: Annotated[Any, real("B 2 2*K")]  # J U of the normal, and of the slip
+    across_rows: Annotated[Any, real("B 2*K")]  # the same of the slip across
+    order: Annotated[Any, whole("B")]  # twice a block, and whether friction follows
+    strips: Annotated[Any, whole("3")]  # STRIPS, ...
     body_strip: Annotated[Any, whole("N")]  # strip of a body
     strip: Annotated[Any, whole("B")]  # of what is sorted
-    unsorted: Annotated[Any, whole("B")]  # what is to be ordered by strips
-    strip_start: Annotated[Any, whole("Z+1")]  # in `compact_order`
+    strip_start: Annotated[Any, whole("Z+1")]  # in `order`
     strip_cursor: Annotated[Any, whole("Z")]
+
+
+class SharedWork(NamedTuple):
+    """What threads tell each other."""
+
+    found: Annotated[Any, whole("V")]  # contacts that an item finds; from where on it adds them
+    booked: Annotated[Any, real("V D+5")]  # `EngineState.sums` of an item
+    finite: Annotated[Any, whole("1")]  # whether velocities and gaps are numbers
     worst: Annotated[Any, real("Z")]  # residuals of parts of an island
     signals: Annotated[Any, whole("32")]  # TICKET, ...
     told: Annotated[Any, whole("8")]  # KIND, ...
-    told_times: Annotated[Any, real("4")]  # LENGTH, ...
+    times: Annotated[Any, real("4")]  # LENGTH, ...
     to_solve: Annotated[Any, whole("N")]  # bodies that represent islands
+
+
+class ScratchWork(NamedTuple):
+    """What is in the making."""
+
+    values: Annotated[Any, real("W")]  # arguments and results of kernels
+    pair_gap: Annotated[Any, real("G")]
+    way_gap: Annotated[Any, real("6 Y")]  # gaps of a body or of two, at places on the way
+    way_rate: Annotated[Any, real("6 Y")]  # their rates
+    own_block: Annotated[Any, whole("m")]  # block of each gap of the body at hand, or -1
+    equation_rows: Annotated[Any, real("m k")]  # their gradients, made orthonormal with M^-1
+    matrix: Annotated[Any, real("k k")]
+    vector: Annotated[Any, real("k")]
+    rest_velocity: Annotated[Any, real("k")]
+    slip: Annotated[Any, real("2")]
+    image: Annotated[Any, real("12")]  # of a projection or barrier, with derivatives
+
+
+class Work(NamedTuple):
+    """Workspace of a step, by the stages that share it.
+
+    Threads share it, but for what is in the making: see `OWN`.
+    """
+
+    manner: MannerWork
+    mid: MidpointWork
+    velocity: VelocityWork
+    body: BodyWork
+    ahead: AheadWork
+    path: PathWork
+    sleep: SleepWork
+    island: IslandWork
+    neighbours: NeighbourWork
+    pair: PairWork
+    block: BlockWork
+    event: EventWork
+    search: SearchWork
+    graph: GraphWork
+    matrix: MatrixWork
+    crowd: CrowdWork
+    shared: SharedWork
+    scratch: ScratchWork
+
+
+# What is in the making: every thread has records of its own.
+OWN = ("graph", "matrix", "scratch")
 
 
 class Log(NamedTuple):

@@ -12,7 +12,6 @@ TICKET, LIMIT, ITEMS_DONE, STOP = 0, 8, 16, 24
 EVALUATE, START, PREDICT, BEGIN, END, BOOK, COUNT_GAPS, DETECT, ASSEMBLE, ADD = range(10)
 SOLVE, COMPACT, PRESS, SWEEP, JUDGE, STORE, OBSERVE = range(10, 17)
 
-# What threads are told of a phase.  WATCHED: whether friction that is apart from the contact that
-# presses on it looks at its impulse.
-KIND, STEP_INDEX, COUNT, SET_OFF, AGAIN, ISLAND, WATCHED = range(7)
+# What threads are told of a phase.
+KIND, STEP_INDEX, COUNT, SET_OFF, AGAIN, ISLAND = range(6)
 LENGTH, TIME, SPEED, DISTANCE = range(4)  # of the step; of an island; of contacts

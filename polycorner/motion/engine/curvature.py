@@ -11,7 +11,6 @@ from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gap
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.partition import island_of
-from polycorner.motion.engine.paths import CURVATURE_DEPTH
 from polycorner.motion.engine.rows import speed_at
 
 MISSED = 1e-12  # scaled gap up to which an equation holds
@@ -25,93 +24,101 @@ def correct_curvature(model, state, work, blocks, h):
     Newton's method for the gap itself.  Pairs of bodies are examined only if they move fast enough,
     and crowds are left as they are.
     """
+    velocity, island = work.velocity, work.island
     k, found = model.dimension, False
     for i in range(model.bodies):
-        work.curves_shut[i] = 0
-        work.speed[i] = speed_of(model, work.v_new, i)
+        island.curves_shut[i] = 0
+        work.body.speed[i] = speed_of(model, velocity.new, i)
         for c in range(k):
-            work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
+            work.ahead.q[i, c] = work.mid.q[i, c] + h * velocity.new[i, c]
     for i in range(model.bodies):
-        if work.stage[i] != SETTLED and not in_crowd(model, work, i):
-            work.curves_shut[i] = correct_island(model, work, i, h)
-            found = found or work.curves_shut[i] != 0
+        if island.stage[i] != SETTLED and not in_crowd(model, island, i):
+            island.curves_shut[i] = correct_island(model, work, i, h)
+            found = found or island.curves_shut[i] != 0
     return found
 
 
 @compiled
-def in_crowd(model, work, i):
+def in_crowd(model, island, i):
     """Return whether the island that a body represents is a crowd."""
-    return is_crowd(model, work.island_start[i], work.island_start[i + 1])
+    return is_crowd(model, island.start[i], island.start[i + 1])
 
 
 @compiled
-def correct_island(model, work, island, h):
+def correct_island(model, work, root, h):
     """Raise the velocity bounds of an island; return whether any; see above."""
+    body, ahead, island = work.body, work.ahead, work.island
+    block, scratch = work.block, work.scratch
     found, first, second = ZERO, NONE, NONE
-    fast = np.sqrt(0.5 * CURVATURE_DEPTH) * model.gap_unit / h
-    for s in range(work.island_start[island], work.island_start[island + 1]):
-        b = work.order[s]
-        if work.block_rows[b] > 0 or (model.follows_velocity and work.bound[b] == BENT):
+    # Curvature closes a gap by the square of the travel; below this speed by too little to matter.
+    fast = np.sqrt(0.5 * model.bending) * model.gap_unit / h
+    for s in range(island.start[root], island.start[root + 1]):
+        b = block.order[s]
+        # With forces that follow the velocity, a bent bound is followed by
+        # :func:`follow_curvature`: two corrections would chase each other.
+        if block.rows[b] > 0 or (model.follows_velocity and block.bound[b] == BENT):
             continue
-        i, g = work.block_bodies[b, 0], work.origin[b, 2]
-        if work.origin[b, 0] == OWN_GAP:
+        i, g = block.bodies[b, 0], block.origin[b, 2]
+        if block.origin[b, 0] == OWN_GAP:
             if i != first:
-                evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
+                evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
             first, second = i, NONE
-            gap, following = work.gap[i, g], work.gap_next[i, g]
+            gap, following = work.mid.gap[i, g], ahead.gap[i, g]
         else:
-            j = work.block_bodies[b, 1]
-            if work.speed[i] + work.speed[j] <= fast:
+            j = block.bodies[b, 1]
+            if body.speed[i] + body.speed[j] <= fast:
                 continue
             if i != first or j != second:
-                evaluate_pair_gaps(model, work, i, j, work.q_next)
+                evaluate_pair_gaps(model, scratch, i, j, ahead.q)
             first, second = i, j
-            gap = work.contact_gap[work.origin[b, 1]]
-            following = work.scratch[model.pair_inputs + g]
-        if work.bilateral[b]:
+            gap = work.pair.gap[block.origin[b, 1]]
+            following = scratch.values[model.pair_inputs + g]
+        if block.bilateral[b]:
             if not model.follows_velocity and bend_equation(
-                model, work, b, gap, following, h, model.tolerance
+                model, body, block, b, gap, following, h, model.tolerance
             ):
                 found = ONE
             continue
-        target = min(0.0, gap - h * work.offset[b, 0] - work.block_load[b])
-        if following < target - CURVATURE_DEPTH * model.gap_unit:
-            work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
-            work.offset[b, 0] = (gap - work.block_load[b] - target) / h
-            work.bound[b] = BENT
+        # A gap that is closed too far already need not open by more than the step was asked for.
+        target = min(0.0, gap - h * block.offset[b, 0] - block.load[b])
+        if following < target - model.bending * model.gap_unit:
+            block.load[b] = gap + h * (block.after[b, 0] - block.offset[b, 0]) - following
+            block.offset[b, 0] = (gap - block.load[b] - target) / h
+            block.bound[b] = BENT
             found = ONE
     return found
 
 
 @compiled
-def bend_equation(model, work, b, gap, following, h, share):
+def bend_equation(model, body, block, b, gap, following, h, share):
     """Correct an equation that does not hold at the next midpoint; return whether it does not.
 
     It does up to a share of what bodies travel.
     """
     never_inline()
+    # In an instant nothing curves.
     if h <= STRAIGHT * model.step:
         return False
-    speed = speed_at(work, b)
+    speed = speed_at(body, block, b)
     missed = abs(following - gap + h * gap / model.step)
     if missed <= MISSED * model.gap_unit + share * h * speed:
         return False
-    work.block_load[b] = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
-    work.offset[b, 0] = equation_offset(model, gap, -work.block_load[b], h)
+    block.load[b] = gap + h * (block.after[b, 0] - block.offset[b, 0]) - following
+    block.offset[b, 0] = equation_offset(model, gap, -block.load[b], h)
     return True
 
 
 @compiled
-def bend_bound(model, work, b, gap, following, h, share):
+def bend_bound(model, body, block, b, gap, following, h, share):
     """Correct the bound of a contact whose gap curves otherwise; return whether it does."""
     never_inline()
-    speed = speed_at(work, b)
-    closing = gap + h * (work.after[b, 0] - work.offset[b, 0]) - following
-    more = closing - work.block_load[b]
+    speed = speed_at(body, block, b)
+    closing = gap + h * (block.after[b, 0] - block.offset[b, 0]) - following
+    more = closing - block.load[b]
     if abs(more) <= MISSED * model.gap_unit + share * h * speed:
         return False
-    work.block_load[b] = closing
-    work.offset[b, 0] -= more / h
+    block.load[b] = closing
+    block.offset[b, 0] -= more / h
     return True
 
 
@@ -122,36 +129,38 @@ def follow_curvature(model, state, work, blocks, h):
     The bounds are those that :func:`correct_curvature` raises, now or before.  Their islands have
     changed.
     """
+    mid, body, ahead = work.mid, work.body, work.ahead
+    island, block, scratch = work.island, work.block, work.scratch
     k = model.dimension
     if correct_curvature(model, state, work, blocks, h):
         for i in range(model.bodies):
-            if work.curves_shut[i]:
-                work.stage[i] = CHANGED
+            if island.curves_shut[i]:
+                island.stage[i] = CHANGED
     for i in range(model.bodies):
         for c in range(k):
-            work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
+            ahead.q[i, c] = mid.q[i, c] + h * work.velocity.new[i, c]
     first, second = NONE, NONE
     for b in range(blocks):
-        if work.block_rows[b] > 0 or not (work.bilateral[b] or work.bound[b] == BENT):
+        if block.rows[b] > 0 or not (block.bilateral[b] or block.bound[b] == BENT):
             continue
-        island = island_of(work, b)
-        if work.stage[island] == SETTLED:
+        root = island_of(body, island, block, b)
+        if island.stage[root] == SETTLED:
             continue
-        i, j, g = work.block_bodies[b, 0], work.block_bodies[b, 1], work.origin[b, 2]
-        share, away = settled(model, work, i), i != first or j != second
+        i, j, g = block.bodies[b, 0], block.bodies[b, 1], block.origin[b, 2]
+        share, away = settled(model, body, i), i != first or j != second
         if j < 0:
             if away:
-                evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
-            gap, following = work.gap[i, g], work.gap_next[i, g]
+                evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
+            gap, following = mid.gap[i, g], ahead.gap[i, g]
         else:
             if away:
-                evaluate_pair_gaps(model, work, i, j, work.q_next)
-            gap = work.contact_gap[work.origin[b, 1]]
-            following = work.scratch[model.pair_inputs + g]
+                evaluate_pair_gaps(model, scratch, i, j, ahead.q)
+            gap = work.pair.gap[block.origin[b, 1]]
+            following = scratch.values[model.pair_inputs + g]
         first, second = i, j
-        if work.bilateral[b]:
-            changed = bend_equation(model, work, b, gap, following, h, share)
+        if block.bilateral[b]:
+            changed = bend_equation(model, body, block, b, gap, following, h, share)
         else:
-            changed = bend_bound(model, work, b, gap, following, h, share)
+            changed = bend_bound(model, body, block, b, gap, following, h, share)
         if changed:
-            work.stage[island] = CHANGED
+            island.stage[root] = CHANGED

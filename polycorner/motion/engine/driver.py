@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from polycorner.errors import SolverError
 from polycorner.formulas.tables import Layout
 from polycorner.motion.bodies import IdenticalBodies
-from polycorner.motion.engine.allocation import allocate, restored
+from polycorner.motion.engine.allocation import allocate, own_workspace, restored, workspace
 from polycorner.motion.engine.arrays import (
     CONTACTS,
     CONTACTS_FULL,
@@ -21,15 +21,14 @@ from polycorner.motion.engine.arrays import (
     STEPS,
     SWEEPS,
     UNSOLVED,
+    EngineState,
     Log,
-    State,
-    Work,
     declarations,
 )
 from polycorner.motion.engine.intermediate import compiled_advance
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.engine.sizes import Sizes
-from polycorner.motion.engine.threads import assisted, copies
+from polycorner.motion.engine.threads import assisted
 from polycorner.motion.events import EventTable, joined
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import Noise, Solver
@@ -95,7 +94,7 @@ class Engine:
         self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
         self.capacity = max(16, CONTACTS_PER_BODY * bodies.count)
         self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start, self.dt)
-        self.motion = allocate(State, self._sizes)
+        self.motion = allocate(EngineState, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
         self.motion.rank[:] = self.motion.body_of_rank[:] = np.arange(bodies.count)
         self.motion.touches[:, self.model.unilateral :] = 1
@@ -108,12 +107,14 @@ class Engine:
     def _allocate(self) -> None:
         """Allocate the workspace, and tell compiled code where everything is."""
         sizes = self._sizes
-        self.work, self.log = allocate(Work, sizes), allocate(Log, sizes)
+        self.work, self.log = workspace(sizes), allocate(Log, sizes)
         self.model = self.model._replace(contact_room=sizes.C, neighbour_room=sizes.P)
-        self._works = [self.work, *copies(self.work, sizes, self.model.threads)]
+        others = range(self.model.threads - 1)
+        self._works = [self.work, *(own_workspace(self.work, sizes) for _ in others)]
         shared = [_table_of(record) for record in (self.model, self.motion, self.log)]
-        own = [_table_of(work) for work in self._works]
-        self._tables = shared + own  # kept as long as they are used
+        parts = [[_table_of(part) for part in work] for work in self._works]
+        own = [np.array([part.ctypes.data for part in tables]) for tables in parts]
+        self._tables = (shared, parts, own)  # kept as long as they are used
         model, motion, log = (table.ctypes.data for table in shared)
         self._addresses = [np.array([model, motion, work.ctypes.data, log]) for work in own]
 
@@ -197,7 +198,7 @@ class Engine:
             for name, force in zip(names, at.force, strict=True):
                 if not np.isfinite(force):
                     return f"the force on {name}{where} is {force}"
-            for name, gap in zip(body.contacts, self.work.gap[i], strict=True):
+            for name, gap in zip(body.contacts, self.work.mid.gap[i], strict=True):
                 if np.isnan(gap):
                     return f"the gap {name!r}{where} is not a number"
         return f"the velocities after t = {self.time:.6g}, dt = {self.dt:.6g} later, are not finite"
@@ -220,7 +221,7 @@ class Engine:
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
         self.bodies.check_places(arrays["q"], arrays["v"], self.dt)
-        self.motion = restored(State, self._sizes, arrays)
+        self.motion = restored(EngineState, self._sizes, arrays)
         self._allocate()
 
     def energies(self) -> tuple[float, float]:

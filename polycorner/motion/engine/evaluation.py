@@ -6,7 +6,6 @@ from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import CHANGED, SETTLED
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
-from polycorner.motion.engine.random import gaussian, held_integral
 
 # How a body is touched: by its surroundings only, or by other bodies as well.
 ALONE, TOGETHER = range(1, 3)
@@ -21,25 +20,61 @@ KICK = 32  # index of the first random impulse; those below are of chattering lo
 
 
 @compiled
-def evaluate_forces(model, work, i, v, h, mass):
+def mix(x):
+    """Return a well-mixed 64-bit number: the finaliser of SplitMix64 ([Steele])."""
+    x = np.uint64(x) + np.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
+@compiled
+def gaussian(seed, when, body, which):
+    """Return the standard normal number that belongs to a seed, a time, a body and an index."""
+    key = mix(np.uint64(seed) ^ mix(np.uint64(when) ^ mix(np.uint64(body * 64 + which))))
+    other = mix(key)
+    unit = 1.0 / 9007199254740992.0
+    first = (np.float64(key >> np.uint64(11)) + 0.5) * unit
+    second = (np.float64(other >> np.uint64(11)) + 0.5) * unit
+    return np.sqrt(-2.0 * np.log(first)) * np.cos(2.0 * np.pi * second)
+
+
+@compiled
+def held_integral(seed, held, begin, end, body, which):
+    """Return the integral over time of ``xi_n``, which is constant on ``[n held, (n + 1) held)``.
+
+    ``xi_n`` is the standard normal number that belongs to the seed, ``n``, the body and the index.
+    Integrals over parts of an interval add up to that over the whole.
+    """
+    total = 0.0
+    for n in range(np.int64(np.floor(begin / held)), np.int64(np.floor(end / held)) + 1):
+        length = min(end, (n + 1) * held) - max(begin, n * held)
+        if length > 0.0:
+            total += length * gaussian(seed, n, body, which)
+    return total
+
+
+@compiled
+def evaluate_forces(model, mid, scratch, i, v, h, mass):
     """Evaluate forces of a body at the midpoint, and its mass if asked for.
 
-    Return where its loads are in scratch.
+    Return where its loads are in values.
     """
-    k, scratch = model.dimension, work.scratch
+    k, values = model.dimension, scratch.values
     for c in range(k):
-        scratch[c] = work.q_mid[i, c]
-        scratch[k + c] = v[i, c]
-    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+        values[c] = mid.q[i, c]
+        values[k + c] = v[i, c]
+    start, base = values.ctypes.data, model.parameters.ctypes.data
     f0 = 2 * k
     call_kernel(model.force_kernel, start, base, start + 8 * f0, start, start)
     upper = k * (k + 1) // 2
-    if mass and not (model.constant_mass and work.mass[i, 0, 0] > 0.0):
-        invert(scratch, f0, k, work.mass[i], work.inverse_mass[i])
+    # A constant mass matrix is inverted once: its first entry tells that this was done.
+    if mass and not (model.constant_mass and mid.mass[i, 0, 0] > 0.0):
+        invert(values, f0, k, mid.mass[i], mid.inverse_mass[i])
     at = f0 + upper
     for c in range(k):
-        work.force[i, c] = h * scratch[at + c]
-        work.applied[i, c] = h * scratch[at + k + c]
+        mid.force[i, c] = h * values[at + c]
+        mid.applied[i, c] = h * values[at + k + c]
     return at + 2 * k
 
 
@@ -59,37 +94,40 @@ def random_impulse(model, i, c, h, time, index):
 
 
 @compiled
-def evaluate_body(model, state, work, i, h, time, index):
+def evaluate_body(model, state, mid, scratch, i, h, time, index):
     """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
-    k, F, scratch = model.dimension, model.frictions, work.scratch
+    k, F, values = model.dimension, model.frictions, scratch.values
     for c in range(k):
-        work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
-        work.kick[i, c] = 0.0
+        mid.q[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
+        mid.kick[i, c] = 0.0
         if model.kicks[c] > 0.0:
-            work.kick[i, c] = random_impulse(model, i, c, h, time, index)
+            mid.kick[i, c] = random_impulse(model, i, c, h, time, index)
+    # Before forces are evaluated, since these depend on the midpoint.
     if model.unilateral < model.restitution.size:
-        approach_equations(model, work, i)
-    at = evaluate_forces(model, work, i, state.v, h, True)
+        approach_equations(model, mid, scratch, i)
+    at = evaluate_forces(model, mid, scratch, i, state.v, h, True)
     if model.chatter > 0.0:
         when = np.int64(np.floor(time / model.correlation_time))
         for j in range(model.loads):
+            # Drawn by the number of the interval, so that parts of a step and runs that resume meet
+            # the same noise.
             factor = 1.0 + model.chatter * gaussian(model.seed, when, i, j)
-            scratch[at + j] *= max(0.0, factor)
+            values[at + j] *= max(0.0, factor)
     for f in range(F):
         load = 0.0
         for j in range(model.loads):
             if model.load_sources[f, j]:
-                load += scratch[at + j]
-        work.load[i, f] = max(0.0, h * load)
-    evaluate_slips(model, state, work, i)
-    evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
+                load += values[at + j]
+        mid.load[i, f] = max(0.0, h * load)
+    evaluate_slips(model, state, mid, scratch, i)
+    evaluate_gaps(model, scratch, i, mid.q, mid.gap, mid.gradient)
 
 
 @compiled
-def evaluate_slips(model, state, work, i):
+def evaluate_slips(model, state, mid, scratch, i):
     """Evaluate the slips of a body at the midpoint: derivatives by velocities, and what is left."""
-    k, scratch = model.dimension, work.scratch
-    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    k, values = model.dimension, scratch.values
+    start, base = values.ctypes.data, model.parameters.ctypes.data
     for call in range(model.slip_kernels):
         address, n, m = (
             model.slip_calls[call, 0],
@@ -99,64 +137,70 @@ def evaluate_slips(model, state, work, i):
         r0, w0, p0 = model.slip_calls[call, 3], model.slip_calls[call, 4], model.slip_calls[call, 5]
         for a in range(n):
             c = model.slip_reads[r0 + a]
-            scratch[a] = work.q_mid[i, c] if c < k else state.v[i, c - k]
+            values[a] = mid.q[i, c] if c < k else state.v[i, c - k]
         j0 = n + m
         call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
         for o in range(m):
             r = model.slip_places[w0 + o]
+            # Kernels shared by several contacts have outputs that this body does not use.
             if r < 0:
                 continue
-            value = scratch[n + o]
+            value = values[n + o]
             size = abs(value)
             for c in range(k):
-                work.slip_rows[i, r, c] = 0.0
+                mid.slip_rows[i, r, c] = 0.0
             for a in range(n):
                 c = model.slip_reads[r0 + a] - k
                 if c >= 0:
-                    slope = scratch[j0 + o * n + a]
-                    work.slip_rows[i, r, c] = slope
+                    slope = values[j0 + o * n + a]
+                    mid.slip_rows[i, r, c] = slope
                     value -= slope * state.v[i, c]
                     size += abs(slope * state.v[i, c])
-            work.slip_offset[i, r] = value if abs(value) > 1e-14 * size else 0.0
+            # What cancels up to rounding is zero: otherwise a body on a substrate that rests would
+            # creep, and never sleep.
+            mid.slip_offset[i, r] = value if abs(value) > 1e-14 * size else 0.0
 
 
 @compiled
-def approach_equations(model, work, i):
+def approach_equations(model, mid, scratch, i):
     """Move the midpoint of a body onto its equations, if it is not there.
 
     After equal steps it is: this is needed at the start, and after shorter steps.  The steps are
     Gauss and Newton's, of least length in scaled coordinates; equations may be redundant.
     """
     never_inline()
-    k, A, x = model.dimension, work.body_matrix, work.body_vector
+    k, A, x = model.dimension, scratch.matrix, scratch.vector
     for _ in range(MOST_APPROACHES):
-        evaluate_gaps(model, work, i, work.q_mid, work.gap, work.gradient)
+        evaluate_gaps(model, scratch, i, mid.q, mid.gap, mid.gradient)
         worst = 0.0
         for c in range(k):
             x[c] = 0.0
             for a in range(k):
+                # The small weight of the change makes the matrix definite where equations are
+                # redundant, and the step the shortest one otherwise.
                 A[c, a] = BENDING * model.units[c] ** 2 if a == c else 0.0
         for g in range(model.unilateral, model.restitution.size):
-            row, size = work.gradient[i, g], 0.0
+            row, size = mid.gradient[i, g], 0.0
             for c in range(k):
                 size += (row[c] / model.units[c]) ** 2
             if size > 0.0:
-                worst = max(worst, abs(work.gap[i, g]) / np.sqrt(size))
+                worst = max(worst, abs(mid.gap[i, g]) / np.sqrt(size))
+                # Rows have unit length in scaled coordinates, so that all equations weigh the same.
                 add_square(A, row, 1.0 / size, k)
                 for c in range(k):
-                    x[c] -= work.gap[i, g] / size * row[c]
+                    x[c] -= mid.gap[i, g] / size * row[c]
         if not worst > ON_EQUATIONS or not solve_spd(A, x, k):
             return
         for c in range(k):
-            work.q_mid[i, c] += x[c]
+            mid.q[i, c] += x[c]
 
 
 @compiled
-def settled(model, work, i):
+def settled(model, body, i):
     """Return the change of a velocity, relative to the speed, that is none."""
-    if not work.touched[i]:
+    if not body.touched[i]:
         return CHANGE_FREE
-    share = CHANGE_TOGETHER if work.touched[i] == TOGETHER else CHANGE_ALONE
+    share = CHANGE_TOGETHER if body.touched[i] == TOGETHER else CHANGE_ALONE
     return max(CHANGE_FREE, share * model.tolerance)
 
 
@@ -167,75 +211,77 @@ def update_forces(model, state, work, h):
     Those of a body that change nothing remain as they are, so that its motion does not depend on
     how often other bodies are evaluated.
     """
+    mid, velocity, body, island = work.mid, work.velocity, work.body, work.island
     k = model.dimension
     for i in range(model.bodies):
-        island = work.parent[i]
-        if not (state.alive[i] and work.awake[i]) or work.stage[island] == SETTLED:
+        root = island.parent[i]
+        if not (state.alive[i] and body.awake[i]) or island.stage[root] == SETTLED:
             continue
         for c in range(k):
-            work.v_mean[i, c] = 0.5 * (state.v[i, c] + work.v_new[i, c])
-            work.former_force[i, c] = work.force[i, c]
-        evaluate_forces(model, work, i, work.v_mean, h, False)
+            body.v_mean[i, c] = 0.5 * (state.v[i, c] + velocity.new[i, c])
+            body.former_force[i, c] = mid.force[i, c]
+        evaluate_forces(model, mid, work.scratch, i, body.v_mean, h, False)
         change, speed = 0.0, 0.0
         for c in range(k):
             value = 0.0
             for a in range(k):
-                difference = work.force[i, a] - work.former_force[i, a]
-                value += work.inverse_mass[i, c, a] * difference
+                difference = mid.force[i, a] - body.former_force[i, a]
+                value += mid.inverse_mass[i, c, a] * difference
             change = max(change, abs(value) * model.units[c])
-            speed += (abs(work.v_new[i, c]) + abs(state.v[i, c])) * model.units[c]
-        if change > settled(model, work, i) * speed:
-            work.stage[island] = CHANGED
+            speed += (abs(velocity.new[i, c]) + abs(state.v[i, c])) * model.units[c]
+        # As a change of velocity, not of force: what it means depends on the mass.
+        if change > settled(model, body, i) * speed:
+            island.stage[root] = CHANGED
             continue
         for c in range(k):
-            work.force[i, c] = work.former_force[i, c]
+            mid.force[i, c] = body.former_force[i, c]
 
 
 @compiled
-def evaluate_gaps(model, work, i, q, gap, gradient):
+def evaluate_gaps(model, scratch, i, q, gap, gradient):
     """Evaluate the gaps between a body and its surroundings, and their gradients."""
-    scratch = work.scratch
-    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    values = scratch.values
+    start, base = values.ctypes.data, model.parameters.ctypes.data
     for call in range(model.gap_kernels):
         address, n, m = model.gap_calls[call, 0], model.gap_calls[call, 1], model.gap_calls[call, 2]
         r0, w0, p0 = model.gap_calls[call, 3], model.gap_calls[call, 4], model.gap_calls[call, 5]
         for a in range(n):
-            scratch[a] = q[i, model.gap_reads[r0 + a]]
+            values[a] = q[i, model.gap_reads[r0 + a]]
         j0 = n + m
         call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
         for o in range(m):
             g = model.gap_places[w0 + o]
             if g >= 0:
-                gap[i, g] = scratch[n + o]
+                gap[i, g] = values[n + o]
                 for c in range(model.dimension):
                     gradient[i, g, c] = 0.0
                 for a in range(n):
-                    gradient[i, g, model.gap_reads[r0 + a]] += scratch[j0 + o * n + a]
+                    gradient[i, g, model.gap_reads[r0 + a]] += values[j0 + o * n + a]
 
 
 @compiled
-def evaluate_pair(model, work, a, b, q):
+def evaluate_pair(model, scratch, a, b, q):
     """Evaluate the gaps of a pair of bodies and their gradients.
 
     The scratch array gets the coordinates that the gaps read, the gaps, and their gradients.
     """
-    call_pair_kernel(model, work, model.pair_kernel, a, b, q)
+    call_pair_kernel(model, scratch, model.pair_kernel, a, b, q)
 
 
 @compiled
-def evaluate_pair_gaps(model, work, a, b, q):
+def evaluate_pair_gaps(model, scratch, a, b, q):
     """Evaluate the gaps of a pair of bodies alone, where :func:`evaluate_pair` leaves them."""
-    call_pair_kernel(model, work, model.pair_values, a, b, q)
+    call_pair_kernel(model, scratch, model.pair_values, a, b, q)
 
 
 @compiled
-def call_pair_kernel(model, work, kernel, a, b, q):
+def call_pair_kernel(model, scratch, kernel, a, b, q):
     """Call a kernel for two bodies."""
-    scratch, n, m = work.scratch, model.pair_inputs, model.pair_gaps
-    start, base = scratch.ctypes.data, model.parameters.ctypes.data
+    values, n, m = scratch.values, model.pair_inputs, model.pair_gaps
+    start, base = values.ctypes.data, model.parameters.ctypes.data
     for r in range(n):
         body = a if model.pair_reads[r, 0] == 0 else b
-        scratch[r] = q[body, model.pair_reads[r, 1]]
+        values[r] = q[body, model.pair_reads[r, 1]]
     j0, p0 = n + m, model.pair_parameters
     call_kernel(kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
 
@@ -245,29 +291,34 @@ def start_body(model, state, work, i):
     """Set the free velocity, due to forces alone, of a body that is awake, and measure its speed.
 
     Bodies of settled islands remain as they were solved.  Where a velocity or a gap is not a
-    number, ``work.finite`` becomes zero.
+    number, ``shared.finite`` becomes zero.
     """
-    if not state.alive[i] or work.stage[work.parent[i]] == SETTLED:
+    mid, velocity, body, island = work.mid, work.velocity, work.body, work.island
+    if not state.alive[i] or island.stage[island.parent[i]] == SETTLED:
         return
     k, finite, speed = model.dimension, True, 0.0
     for c in range(k):
         value = state.v[i, c]
-        if work.awake[i]:
+        if body.awake[i]:
             for a in range(k):
-                value += work.inverse_mass[i, c, a] * (work.force[i, a] + work.kick[i, a])
-        work.v_old[i, c] = state.v[i, c]
-        work.v_free[i, c] = value
-        work.v_new[i, c] = value
+                value += mid.inverse_mass[i, c, a] * (mid.force[i, a] + mid.kick[i, a])
+        velocity.old[i, c] = state.v[i, c]
+        velocity.free[i, c] = value
+        velocity.new[i, c] = value
         finite = finite and np.isfinite(value)
     for c in range(k):
+        # Speeds are relative to the substrate: a body carried along at rest has none, and
+        # tolerances are multiples of speeds.
         carried = model.substrate_speed / model.units[c] if c == model.position[0] else 0.0
         before = abs(state.v[i, c] - carried) * model.units[c]
-        speed += max(before, abs(work.v_free[i, c] - carried) * model.units[c])
-    work.speed[i], work.island_speed[i] = speed, speed
-    work.touched[i] = 0
+        speed += max(before, abs(velocity.free[i, c] - carried) * model.units[c])
+    body.speed[i], body.island_speed[i] = speed, speed
+    body.touched[i] = 0
+    # Only crowds move bodies apart; nobody reads this array otherwise.
     for c in range(k if model.crowd_sweeps > 0 else 0):
-        work.shift[i, c] = 0.0
+        work.crowd.shift[i, c] = 0.0
     for g in range(model.restitution.size):
-        finite = finite and not np.isnan(work.gap[i, g])
+        # An infinite gap is far; one that is not a number would pass all comparisons as open.
+        finite = finite and not np.isnan(mid.gap[i, g])
     if not finite:
-        work.finite[0] = 0
+        work.shared.finite[0] = 0

@@ -8,18 +8,19 @@ from polycorner.motion.engine.arrays import (
     LAST,
     NEWTON_STEPS,
     OWN_FRICTION,
+    PAIR_FRICTION,
     SMALL,
     SWEEPS,
 )
 from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
-from polycorner.motion.engine.grip import keeps_grip
 from polycorner.motion.engine.island_matrix import number_bodies
 from polycorner.motion.engine.jit import ONE, compiled
+from polycorner.motion.engine.linear_algebra import add_square, solve_spd
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts
-from polycorner.motion.engine.rows import copy_velocity, velocity_of
+from polycorner.motion.engine.rows import copy_velocity, load_on, sticks, velocity_of
 from polycorner.motion.engine.signals import increase
 
 FIRST_SOFTNESS = 1e2  # relative softness of contacts in Newton steps, over the tolerance
@@ -48,41 +49,46 @@ def iterate(model, state, work, first, last, speed, again, may_rest):
     are made softer from round to round, and hard again.  It ends when the residual has reached its
     goal, when ``model.sweeps`` are done, or when a cycle of rounds has not halved the residual.
     """
+    manner, velocity, block = work.manner, work.velocity, work.block
+    search, scratch = work.search, work.scratch
     goal, worst = model.tolerance * speed, np.inf
-    n = number_bodies(model, work, first, last)
+    n = number_bodies(model, work.body, block, work.graph, work.matrix, first, last)
     small = 0 < n * model.lanes <= FEW_LANES
     direct = n > 0 and (again or (small and last - first > FEW))
     enough = SPARE * goal if small else goal
-    worst = residual(model, work, first, last, 0.0)
+    worst = residual(model, velocity, block, search, scratch, first, last, 0.0)
+    # The impulses of the step before may do: most islands of a heap at rest end here.
     if worst <= enough:
         return worst
     hard = min(MAX_SOFTNESS, FIRST_SOFTNESS * model.tolerance)
     rounds, done, former = 0, 0, np.inf
     while rounds == 0 or (worst > goal and done < model.sweeps):
         if rounds == 1:
-            leave_errors(work, first, last)
+            leave_errors(block, first, last)
         if not direct or rounds > 0:
             for _ in range(FIRST_SWEEPS if rounds == 0 else ROUND_SWEEPS):
                 worst = 0.0
                 for s in range(first, last):
-                    worst = max(worst, relax_block(model, work, work.order[s]))
+                    worst = max(worst, relax_block(model, velocity, block, scratch, block.order[s]))
                 done += 1
                 if worst <= enough:
                     break
-            worst = residual(model, work, first, last, 0.0)
+            worst = residual(model, velocity, block, search, scratch, first, last, 0.0)
         if worst > enough and n > 0:
             phase = rounds % CYCLE_ROUNDS
+            # Softer contacts have larger regions in which Newton steps converge; hard ones every
+            # third round, since only these solve the island.
             softness = hard if phase == 0 or rounds == 1 else MAX_SOFTNESS * 3.0**phase
             steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
             increase(state.counts, NEWTON_STEPS, steps)
             if worst > goal and rounds == 1:
                 if may_rest and rests(model, state, work, first, last, speed):
-                    worst = residual(model, work, first, last, 0.0)
+                    worst = residual(model, velocity, block, search, scratch, first, last, 0.0)
                     break
-                if work.remedy[0] == DIVIDED and last - first <= MANY:
+                if manner.remedy[0] == DIVIDED and last - first <= MANY:
                     break
                 worst = continue_island(model, state, work, first, last, n, goal, hard)
-                if worst > goal and work.remedy[0] != LAST:
+                if worst > goal and manner.remedy[0] != LAST:
                     break
             if phase == CYCLE_ROUNDS - 1:
                 if worst > 0.5 * former:
@@ -101,71 +107,74 @@ def solve_acting(model, state, work, first, last, speed, again, may_rest):
     their gaps are left out, and looked at afterwards: they are added, and the island solved again,
     where they would be violated.
     """
+    velocity, block, search = work.velocity, work.block, work.search
     acting, goal = last, model.tolerance * speed
     if last - first > CROWD:
-        acting = gather_acting(model, work, first, last)
+        acting = gather_acting(model, velocity, block, search, first, last)
     while True:
         worst, before = 0.0, acting
         if acting > first:
             worst = iterate(model, state, work, first, acting, speed, again, may_rest)
         for s in range(before, last):
-            b = work.order[s]
-            velocity_of(model, work, b, work.v_new, work.after[b])
-            if work.block_rows[b] == 0:
-                worst = max(worst, -work.after[b, 0])
-                if work.after[b, 0] < -goal:
-                    acting = move_forward(work, s, acting)
+            b = block.order[s]
+            velocity_of(model, block, b, velocity.new, block.after[b])
+            if block.rows[b] == 0:
+                worst = max(worst, -block.after[b, 0])
+                if block.after[b, 0] < -goal:
+                    acting = move_forward(block, search, s, acting)
         if acting == before:
             return worst
         for s in range(acting, last):
-            b = work.order[s]
-            if work.block_rows[b] > 0 and work.carries[work.pressing[b]]:
-                acting = move_forward(work, s, acting)
+            b = block.order[s]
+            if block.rows[b] > 0 and search.carries[block.pressing[b]]:
+                acting = move_forward(block, search, s, acting)
+        # Most of it is solved: Newton steps from here are better than sweeps.
         again = True
 
 
 @compiled
-def gather_acting(model, work, first, last):
+def gather_acting(model, velocity, block, search, first, last):
     """Bring the blocks that may act to the front of an island; return where the others begin."""
     for s in range(first, last):
-        b = work.order[s]
-        velocity_of(model, work, b, work.v_new, work.after[b])
-        work.carries[b] = 1.0
-        if work.block_rows[b] == 0 and not work.bilateral[b] and work.impulse[b, 0] == 0.0:
-            work.carries[b] = work.after[b, 0] < NEARLY_OPEN * max(0.0, work.offset[b, 0])
+        b = block.order[s]
+        velocity_of(model, block, b, velocity.new, block.after[b])
+        search.carries[b] = 1.0
+        if block.rows[b] == 0 and not block.bilateral[b] and block.impulse[b, 0] == 0.0:
+            search.carries[b] = block.after[b, 0] < NEARLY_OPEN * max(0.0, block.offset[b, 0])
     for s in range(first, last):
-        b = work.order[s]
-        if work.pressing[b] >= 0 and (work.impulse[b, 0] != 0.0 or work.impulse[b, 1] != 0.0):
-            work.carries[work.pressing[b]] = 1.0
+        b = block.order[s]
+        if block.pressing[b] >= 0 and (block.impulse[b, 0] != 0.0 or block.impulse[b, 1] != 0.0):
+            # Friction that acts keeps its contact, though that does not press at the moment.
+            search.carries[block.pressing[b]] = 1.0
     acting = first
     for s in range(first, last):
-        b = work.order[s]
-        pressing = work.pressing[b]
-        if work.carries[b] if pressing < 0 else work.carries[pressing]:
-            acting = move_forward(work, s, acting)
+        b = block.order[s]
+        pressing = block.pressing[b]
+        if search.carries[b] if pressing < 0 else search.carries[pressing]:
+            acting = move_forward(block, search, s, acting)
     return acting
 
 
 @compiled
-def move_forward(work, s, acting):
+def move_forward(block, search, s, acting):
     """Move a block to the end of those that act; return their new end."""
-    b = work.order[s]
-    work.order[s], work.order[acting] = work.order[acting], b
-    work.carries[b] = 1.0
+    b = block.order[s]
+    block.order[s], block.order[acting] = block.order[acting], b
+    search.carries[b] = 1.0
     return acting + 1
 
 
 @compiled
-def leave_errors(work, first, last):
+def leave_errors(block, first, last):
     """Let small errors of closed gaps be."""
     for s in range(first, last):
-        b = work.order[s]
-        if work.block_rows[b] == 0 and work.bound[b] == SMALL:
-            work.offset[b, 0] = 0.0
+        b = block.order[s]
+        if block.rows[b] == 0 and block.bound[b] == SMALL:
+            block.offset[b, 0] = 0.0
 
 
 @compiled
-def switch_reversed_slips(model, state, work, first, last):
+def switch_reversed_slips(model, state, block, search, first, last):
     """Give the static set to contacts whose slip reversed; return whether any was switched.
 
     Slip that reverses within a step was zero within it, where the static set decides whether the
@@ -173,36 +182,37 @@ def switch_reversed_slips(model, state, work, first, last):
     """
     found = False
     for s in range(first, last):
-        b = work.order[s]
-        if work.block_rows[b] == 0 or work.reversed[b]:
+        b = block.order[s]
+        # Once in a step: a contact that switched to and fro would never end.
+        if block.rows[b] == 0 or search.reversed[b]:
             continue
         along = 0.0
-        for r in range(work.block_rows[b]):
-            along += (work.before[b, r] + work.offset[b, r]) * work.after[b, r]
+        for r in range(block.rows[b]):
+            along += (block.before[b, r] + block.offset[b, r]) * block.after[b, r]
         if along < 0.0:
-            work.reversed[b] = 1
-            kind, f = work.origin[b, 0], work.origin[b, 2]
+            search.reversed[b] = 1
+            kind, f = block.origin[b, 0], block.origin[b, 2]
             shape = model.friction_sets[f, 0] if kind == OWN_FRICTION else model.pair_sets[f, 0]
-            if shape != work.block_set[b]:
-                work.block_set[b] = shape
+            if shape != block.set[b]:
+                block.set[b] = shape
                 found = True
     return found
 
 
 @compiled
-def begin_island(state, work, first, last):
+def begin_island(state, body, block, search, first, last):
     """Return the speed of an island after forces alone, and whether all its bodies are at rest."""
     speed, at_rest = 0.0, True
     for s in range(first, last):
-        b = work.order[s]
-        work.reversed[b] = 0
-        for r in range(max(1, work.block_rows[b])):
-            speed = max(speed, abs(work.free[b, r] + work.offset[b, r]))
+        b = block.order[s]
+        search.reversed[b] = 0
+        for r in range(max(1, block.rows[b])):
+            speed = max(speed, abs(block.free[b, r] + block.offset[b, r]))
     for s in range(first, last):
         for side in range(2):
-            i = work.block_bodies[work.order[s], side]
-            if i >= 0 and work.awake[i]:  # sleepers may touch several islands
-                work.island_speed[i] = max(work.island_speed[i], speed)
+            i = block.bodies[block.order[s], side]
+            if i >= 0 and body.awake[i]:  # sleepers may touch several islands
+                body.island_speed[i] = max(body.island_speed[i], speed)
                 at_rest = at_rest and state.rests[i] != 0
     increase(state.counts, ISLANDS, ONE)
     return speed, at_rest
@@ -214,28 +224,29 @@ def solve_island(model, state, work, first, last, again):
 
     For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
     """
-    speed, at_rest = begin_island(state, work, first, last)
+    velocity, block, search, scratch = work.velocity, work.block, work.search, work.scratch
+    speed, at_rest = begin_island(state, work.body, block, search, first, last)
     if speed == 0.0:  # no motion and no force
         for s in range(first, last):
             for r in range(2):
-                work.impulse[work.order[s], r] = work.after[work.order[s], r] = 0.0
+                block.impulse[block.order[s], r] = block.after[block.order[s], r] = 0.0
         for s in range(first, last):
             for side in range(2):
-                i = work.block_bodies[work.order[s], side]
+                i = block.bodies[block.order[s], side]
                 if i >= 0:
-                    copy_velocity(model, work.v_free, work.v_new, i)
+                    copy_velocity(model, velocity.free, velocity.new, i)
         return 0.0
     if at_rest and rests(model, state, work, first, last, speed):
-        return residual(model, work, first, last, 0.0) / speed
+        return residual(model, velocity, block, search, scratch, first, last, 0.0) / speed
     while True:
         worst = solve_acting(model, state, work, first, last, speed, again, not at_rest)
         if worst > model.tolerance * speed or not switch_reversed_slips(
-            model, state, work, first, last
+            model, state, block, search, first, last
         ):
             break
     solved = worst <= model.tolerance * speed
     if keeps_grip(model, state, work, first, last, speed, solved):
-        worst = residual(model, work, first, last, 0.0)
+        worst = residual(model, velocity, block, search, scratch, first, last, 0.0)
     return worst / speed
 
 
@@ -246,23 +257,93 @@ def rests(model, state, work, first, last, speed):
     Where it sticks in closed loops, the errors of its gaps cannot all be corrected at once without
     forces that grow without bound: nothing but rest solves the step.
     """
-    k, v, rest = model.dimension, work.v_rest, work.rest_velocity
+    mid, velocity, block, scratch = work.mid, work.velocity, work.block, work.scratch
+    k, v, rest = model.dimension, velocity.rest, scratch.rest_velocity
     for s in range(first, last):
         for side in range(2):
-            i = work.block_bodies[work.order[s], side]
+            i = block.bodies[block.order[s], side]
             if i < 0:
                 continue
             for c in range(k):
                 v[i, c] = state.v[i, c]
-            if not work.awake[i]:
+            if not work.body.awake[i]:
                 continue
-            if state.rests[i] and keeps_contacts(model, work, state.normal, i, state.v[i]):
+            if state.rests[i] and keeps_contacts(model, mid, state.normal, i, state.v[i]):
                 continue
-            if not find_rest_velocity(model, work, state.normal, i, rest):
+            if not find_rest_velocity(model, mid, scratch, state.normal, i, rest):
                 return False
             for c in range(k):
-                far = abs(work.v_new[i, c] - rest[c]) * model.units[c]
+                far = abs(velocity.new[i, c] - rest[c]) * model.units[c]
+                # A body that was not at rest may be stopped only where it hardly moves: rest must
+                # not swallow a motion.
                 if not state.rests[i] and far > SLOW * speed:
                     return False
                 v[i, c] = rest[c]
     return find_equilibrium(model, state, work, first, last, speed)
+
+
+@compiled
+def keeps_grip(model, state, work, first, last, speed, solved):
+    """Return whether an island of one body that stuck, and now slips or is not solved, can stick.
+
+    Then the impulses that hold it, and its velocity, are the solution.  Where loads depend on
+    friction, slip can solve a step that sticking solves as well: what stuck goes on to stick.
+    """
+    velocity, block, scratch = work.velocity, work.block, work.scratch
+    i = block.bodies[block.order[first], 0]
+    return (
+        loses_grip(model, state, work.body, block, first, last, i, solved)
+        and find_grip_velocity(model, velocity, block, scratch, first, last, i)
+        and find_equilibrium(model, state, work, first, last, speed)
+    )
+
+
+@compiled
+def loses_grip(model, state, body, block, first, last, i, solved):
+    """Return whether all friction of a body stuck before the step, and some slips after it.
+
+    Where the step is not solved it counts as slipping.  The velocities after the step must have
+    been evaluated.
+    """
+    slips = False
+    for s in range(first, last):
+        b = block.order[s]
+        # Several bodies may stick and slip in many ways; the question is only asked of one.
+        if block.bodies[b, 1] >= 0 or block.origin[b, 0] == PAIR_FRICTION:
+            return False
+        if block.origin[b, 0] != OWN_FRICTION or load_on(block, b) <= 0.0:
+            continue
+        if not state.sticks[i, block.origin[b, 2]]:
+            return False
+        slips = slips or not solved or not sticks(model, body, block, b)
+    return slips
+
+
+@compiled
+def find_grip_velocity(model, velocity, block, scratch, first, last, i):
+    """Find the velocity of a body at which its loaded blocks neither slip nor open.
+
+    It is that of least squares; :func:`find_equilibrium` checks that nothing slips at it.
+    """
+    k, A, x = model.dimension, scratch.matrix, scratch.rest_velocity
+    for c in range(k):
+        x[c] = 0.0
+        for a in range(k):
+            A[c, a] = 0.0
+    for s in range(first, last):
+        b = block.order[s]
+        loaded = block.bilateral[b] or block.impulse[b, 0] > 0.0
+        if block.rows[b] > 0:
+            loaded = load_on(block, b) > 0.0
+        if not loaded:
+            continue
+        for r in range(max(1, block.rows[b])):
+            row = block.jacobian[b, r, :k]
+            add_square(A, row, 1.0, k)
+            for c in range(k):
+                x[c] -= block.offset[b, r] * row[c]
+    if not solve_spd(A, x, k):
+        return False
+    for c in range(k):
+        velocity.rest[i, c] = x[c]
+    return True

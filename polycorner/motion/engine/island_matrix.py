@@ -1,8 +1,8 @@
 """The matrix of an island, and its solution by sparse elimination.
 
 The matrix has a block of ``K x K`` numbers, ``K`` the lanes of a body, for each body and for each
-two that share an entry.  In ``work.matrix`` the blocks of the diagonal come first, in the order of
-elimination; then for each entry of :mod:`~polycorner.motion.engine.ordering` the one above the
+two that share an entry.  In ``matrix.entries`` the blocks of the diagonal come first, in the order
+of elimination; then for each entry of :mod:`~polycorner.motion.engine.ordering` the one above the
 diagonal; then, in the same order, those below.
 """
 
@@ -15,32 +15,35 @@ from polycorner.motion.engine.vectors import entry, load, store, zeros
 
 
 @compiled
-def number_bodies(model, work, first, last):
+def number_bodies(model, body, block, graph, matrix, first, last):
     """Find the order in which bodies of an island are eliminated; return how many there are.
 
     Return 0 if there is no room for the matrix.
     """
     never_inline()
-    n = list_bodies(work, first, last)
-    if not (find_neighbours(work, first, last, n) and eliminate_all(work, n)):
+    n = list_bodies(body, block, graph, matrix, first, last)
+    if not (
+        find_neighbours(body, block, graph, matrix, first, last, n)
+        and eliminate_all(graph, matrix, n)
+    ):
         return ZERO
     for v in range(n):
-        i = work.listed[v]
-        work.members[work.place[v]], work.number[i] = i, work.place[v]
+        i = graph.listed[v]
+        matrix.members[matrix.place[v]], matrix.number[i] = i, matrix.place[v]
     for s in range(first, last):
-        b = work.order[s]
-        x, y = numbers_of(work, b)
-        work.entry[b] = find_entry(work, min(x, y), max(x, y)) if x >= 0 and y >= 0 else NONE
+        b = block.order[s]
+        x, y = numbers_of(block, matrix, b)
+        block.entry[b] = find_entry(matrix, min(x, y), max(x, y)) if x >= 0 and y >= 0 else NONE
     return n
 
 
 @compiled
-def find_entry(work, row, column):
+def find_entry(matrix, row, column):
     """Return the number of an entry above the diagonal."""
-    low, high = work.row_start[row], work.row_start[row + 1]
+    low, high = matrix.row_start[row], matrix.row_start[row + 1]
     while low < high:
         middle = (low + high) // 2
-        if work.columns[middle] < column:
+        if matrix.columns[middle] < column:
             low = middle + ONE
         else:
             high = middle
@@ -48,11 +51,10 @@ def find_entry(work, row, column):
 
 
 @compiled
-def numbers_of(work, b):
-    """Return the numbers of a block's bodies in their island, or -1."""
-    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-    x = work.number[i] if work.awake[i] else NONE
-    return x, work.number[j] if j >= 0 and work.awake[j] else NONE
+def numbers_of(block, matrix, b):
+    """Return the numbers of a block's bodies in their island; -1 for sleepers and no body."""
+    i, j = block.bodies[b, 0], block.bodies[b, 1]
+    return matrix.number[i], matrix.number[j] if j >= 0 else NONE
 
 
 @compiled
@@ -66,6 +68,7 @@ def eliminate_within(A, x, p, above, begin, end, K):
     for r in range(K):
         line = p * size + r * K
         pivot = A[line + r]
+        # So written that a pivot that is not a number is refused as well.
         if not abs(pivot) > 0.0:
             return False
         for s in range(r + 1, K):
@@ -81,6 +84,7 @@ def eliminate_within(A, x, p, above, begin, end, K):
                 for c in range(0, K, WIDTH):
                     store(A, to + c, load(A, to + c) - factor * load(A, at + c))
             x[p * K + s] -= factor * x[p * K + r]
+        # The reciprocal, since every later use divides by the pivot.
         A[line + r] = 1.0 / pivot
     return True
 
@@ -94,6 +98,8 @@ def find_factors(A, block, triangle, K):
             row = triangle + s * K
             factor = A[line + s] * A[row + s]
             if factor != 0.0:
+                # From the vector that holds column s: what is left of it are factors, or is
+                # subtracted zero times, as the triangle has zeros there.
                 for c in range(s // WIDTH * WIDTH, K, WIDTH):
                     store(A, line + c, load(A, line + c) - factor * load(A, row + c))
             A[line + s] = factor
@@ -102,6 +108,8 @@ def find_factors(A, block, triangle, K):
 @compiled
 def subtract_product(A, to, left, right, K):
     """Subtract the product of two blocks from a third one."""
+    # Four rows at once: each row of the right-hand block is then read once for all of them, and
+    # four sums run side by side.
     for r in range(0, K, WIDTH):
         one, a = to + r * K, left + r * K
         for c in range(0, K, WIDTH):
@@ -160,6 +168,7 @@ def solve_matrix(A, x, n, K, row_start, columns):
             j = columns[e]
             upper, lower = above + e * size, below + e * size
             subtract_product(A, j * size, lower, upper, K)
+            # Rows ascend, so that entries of the row of j are found by going on from the last one.
             there = row_start[j]
             for other in range(e + 1, end):
                 while columns[there] < columns[other]:
@@ -174,50 +183,53 @@ def solve_matrix(A, x, n, K, row_start, columns):
 
 
 @compiled
-def solve_island_matrix(model, work, n):
-    """Solve the system of an island for ``work.island_vector`` in place; return if it has been."""
-    x, K = work.island_vector, model.lanes
-    return solve_matrix(work.matrix, x, n, K, work.row_start, work.columns)
+def solve_island_matrix(model, matrix, n):
+    """Solve the system of an island for ``matrix.vector`` in place; return if it has been."""
+    x, K = matrix.vector, model.lanes
+    return solve_matrix(matrix.entries, x, n, K, matrix.row_start, matrix.columns)
 
 
 @compiled
-def assemble_mass(model, work, n, weight):
+def assemble_mass(model, mid, matrix, n, weight):
     """Set the matrix of an island to multiples of the mass matrices, and of 1 in unused lanes."""
-    k, K, A = model.dimension, model.lanes, work.matrix
-    for at in range(0, (n + 2 * work.row_start[n]) * K * K, WIDTH):
+    k, K, A = model.dimension, model.lanes, matrix.entries
+    for at in range(0, (n + 2 * matrix.row_start[n]) * K * K, WIDTH):
         store(A, at, zeros())
     for p in range(n):
-        i = work.members[p]
+        i = matrix.members[p]
         for x in range(K):
             line = (p * K + x) * K
+            # Unused lanes have equations of their own, 1 x = 0: the elimination needs no exception
+            # for them.
             if x >= k:
                 A[line + x] = 1.0
                 continue
             for c in range(0, K, WIDTH):
-                store(A, line + c, weight * load(work.mass, (i * k + x) * K + c))
+                store(A, line + c, weight * load(mid.mass, (i * k + x) * K + c))
 
 
 @compiled
-def block_at(work, n, row, column, e):
+def block_at(matrix, n, row, column, e):
     """Return the number of the block of two bodies in the matrix; ``e`` is their entry."""
     if row == column:
         return row
-    return n + e if row < column else n + work.row_start[n] + e
+    return n + e if row < column else n + matrix.row_start[n] + e
 
 
 @compiled
-def add_block(model, work, n, b):
+def add_block(model, block, search, matrix, n, b):
     """Add ``J' G J`` of a block to the matrix of its island.
 
-    ``G`` stands in ``work.derivative``, row by row, for three rows: that of the contact that
+    ``G`` stands in ``search.derivative``, row by row, for three rows: that of the contact that
     presses on the block, which is zero, and the block's own.
     """
-    K, J, G = model.lanes, work.jacobian, work.derivative
-    pressing, two = work.pressing[b], work.block_rows[b] == 2
+    K, J, G = model.lanes, block.jacobian, search.derivative
+    pressing, two = block.pressing[b], block.rows[b] == 2
     one, other, swap = row_at(model, b, ZERO), row_at(model, b, ONE), ZERO
-    if pressing >= 0 and work.block_bodies[pressing, 0] != work.block_bodies[b, 0]:
+    if pressing >= 0 and block.bodies[pressing, 0] != block.bodies[b, 0]:
+        # Friction may know its bodies the other way round than the contact that presses on it.
         swap = K
-    x, y = numbers_of(work, b)
+    x, y = numbers_of(block, matrix, b)
     for d in range(0 if x >= 0 else K, 2 * K if y >= 0 else K, WIDTH):
         along, across = G[b, 4] * load(J, one + d), zeros()
         if two:
@@ -227,39 +239,39 @@ def add_block(model, work, n, b):
             at = row_at(model, pressing, ZERO) + (d + swap) % (2 * K)
             along = along + G[b, 3] * load(J, at)
             across = across + G[b, 6] * load(J, at)
-        add_columns(model, work, n, b, d, J, one, along)
+        add_columns(model, block, matrix, n, b, d, J, one, along)
         if two:
-            add_columns(model, work, n, b, d, J, other, across)
+            add_columns(model, block, matrix, n, b, d, J, other, across)
 
 
 @compiled
-def add_columns(model, work, n, b, d, rows, at, weighted):
+def add_columns(model, block, matrix, n, b, d, rows, at, weighted):
     """Add the products of a row over the bodies of a block with four entries of another one.
 
     These entries begin with number ``d``.
     """
-    K, A = model.lanes, work.matrix
-    x, y = numbers_of(work, b)
+    K, A = model.lanes, matrix.entries
+    x, y = numbers_of(block, matrix, b)
     column, lane = (x, d) if d < K else (y, d - K)
     for left in range(2):
         row = x if left == 0 else y
         if row < 0:
             continue
-        place = block_at(work, n, row, column, work.entry[b]) * K * K + lane
+        place = block_at(matrix, n, row, column, block.entry[b]) * K * K + lane
         for c in range(model.dimension):
             slope = entry(rows, at + left * K + c)
             store(A, place + c * K, load(A, place + c * K) + slope * weighted)
 
 
 @compiled
-def add_transposed(model, work, b, f, g, target):
+def add_transposed(model, block, matrix, b, f, g, target):
     """Add ``J' (f, g)`` of a block to a vector over the bodies of its island."""
-    x, y = numbers_of(work, b)
-    add_rows(model, work, work.jacobian, b, f, g, target, x, y)
+    x, y = numbers_of(block, matrix, b)
+    add_rows(model, block, block.jacobian, b, f, g, target, x, y)
 
 
 @compiled
-def row_product(model, work, b, r, vector):
+def row_product(model, block, matrix, b, r, vector):
     """Return ``J x`` of one row for a vector over the bodies of an island."""
-    x, y = numbers_of(work, b)
-    return row_times(model, work.jacobian, row_at(model, b, r), vector, x, y)
+    x, y = numbers_of(block, matrix, b)
+    return row_times(model, block.jacobian, row_at(model, b, r), vector, x, y)

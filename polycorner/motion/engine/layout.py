@@ -7,18 +7,19 @@ import numpy as np
 
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.families import Family
-from polycorner.motion.bodies import Body, IdenticalBodies
+from polycorner.motion.bodies import IdenticalBodies, MovingBody
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.allocation import filled
 from polycorner.motion.engine.arrays import Model
 from polycorner.motion.engine.sizes import EVENTS, Sizes
 from polycorner.motion.engine.threads import address_of_yield
 from polycorner.motion.formulation import moment
-from polycorner.motion.noise import Noise, Solver
+from polycorner.motion.noise import MotionOptions, Noise, Solver
 
-NEAR, KICKED = 1e-6, 1e-4  # scaled travel in a step of a slow impact, without and with kicks
-SHARE = 0.01  # that in a crowd, over the reach of bodies
 MANY = 32  # bodies beyond which all are a crowd: parts of a step cost a look at each body
+# Of the options: lengths, which are scaled by the unit of gaps, and others.
+LENGTHS = ("touching", "parting", "zero_gap", "detection", "crowd_overlap")
+SHARES = ("bending", "slow_bounce", "shortest_part", "dependent")
 
 
 def model_of(
@@ -30,7 +31,7 @@ def model_of(
     step: float,
 ) -> Model:
     """Return the model constants of bodies in motion."""
-    body, formulation = bodies.body, bodies.body.formulation
+    body, formulation, options = bodies.body, bodies.body.formulation, solver.options
     parameters = list(body.parameters)
     sets, dependence = _Sets(), _dependence(body)
     if solver.crowd_sweeps and body.equations and not dependence["constant_mass"]:
@@ -69,7 +70,9 @@ def model_of(
         "threads": solver.threads,
         "give_way": address_of_yield(),
         "may_rest": sizes.m + sizes.R >= sizes.k,
-        **_near(bodies, noise),
+        **{name: getattr(options, name) for name in SHARES},
+        **{name: getattr(options, name) * body.gap_unit for name in LENGTHS},
+        **_near(bodies, noise, options),
         "start": start,
         "step": step,
         "time_parameter": body.formulation.time_parameter,
@@ -85,16 +88,17 @@ def model_of(
     return filled(Model, sizes, {**values, "parameters": [*parameters, 0.0]})
 
 
-def _near(bodies: IdenticalBodies, noise: Noise) -> dict[str, float]:
+def _near(bodies: IdenticalBodies, noise: Noise, options: MotionOptions) -> dict[str, float]:
     """Return the scaled travel in a step up to which a plastic impact is slow, and in a crowd."""
-    near = many = KICKED if any(noise.kicks.values()) else NEAR
+    kicked = any(noise.kicks.values())
+    near = many = options.slow_travel_kicked if kicked else options.slow_travel
     if bodies.contacts is not None and bodies.count > 1:
-        many = max(near, SHARE * bodies.contacts.reach / bodies.body.gap_unit)
+        many = max(near, options.crowd_travel * bodies.contacts.reach / bodies.body.gap_unit)
         near = near if bodies.count <= MANY else many
     return {"near": near, "near_many": many}
 
 
-def _dependence(body: Body) -> dict[str, bool]:
+def _dependence(body: MovingBody) -> dict[str, bool]:
     """Return whether masses and forces depend on the state, by comparison at random states."""
     k = len(body.formulation.coordinates)
     draws = np.random.default_rng(0).normal(size=(3, 3, k))
@@ -110,7 +114,7 @@ def _dependence(body: Body) -> dict[str, bool]:
     }
 
 
-def _signals(body: Body, parameters: list[float]) -> dict[str, int]:
+def _signals(body: MovingBody, parameters: list[float]) -> dict[str, int]:
     """Return the entries of the functions of the time; their parameters are appended."""
     if body.signals is None:
         return {"signal_kernel": 0, "signal_parameters": 0}

@@ -16,10 +16,9 @@ from polycorner.motion.engine.bounds import is_slow
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.jit import NONE, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, pair_of, speed_of, travel
+from polycorner.motion.engine.neighbours import pair_of, speed_of, travel
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import (
-    CURVATURE_DEPTH,
     FULL,
     MIDDLE,
     NEXT,
@@ -43,63 +42,66 @@ def slow_travel(model, members):
 @compiled
 def leave_out(model, state, work, blocks, h):
     """Leave out of a step the islands for which it does not do; return whether there are any."""
-    N, joined, left = model.bodies, work.joined, work.cursor
+    manner, mid, body, island, pair = work.manner, work.mid, work.body, work.island, work.pair
+    block, matrix = work.block, work.matrix
+    N, joined, left = model.bodies, island.joined, island.cursor
     found = False
     for i in range(N):
         left[i] = 0
-        first, last = work.island_start[i], work.island_start[i + 1]
+        first, last = island.start[i], island.start[i + 1]
         if last > first and not is_crowd(model, first, last):
-            left[i] = 2 if work.island_residual[i] > model.tolerance else 0
-        work.members[i] = 0
+            left[i] = 2 if island.residual[i] > model.tolerance else 0
+        matrix.members[i] = 0
     for i in range(N):
-        if work.awake[i]:
-            work.members[work.parent[i]] += 1
+        if body.awake[i]:
+            matrix.members[island.parent[i]] += 1
     for i in range(N):
-        if is_large(work, i):
+        if is_large(island, i):
             continue
-        work.near[0] = slow_travel(model, work.members[i])
-        for s in range(work.island_start[i], work.island_start[i + 1]):
-            b = work.order[s]
-            if work.block_rows[b] == 0 and strikes_early(model, state, work, b):
+        manner.near[0] = slow_travel(model, matrix.members[i])
+        for s in range(island.start[i], island.start[i + 1]):
+            b = block.order[s]
+            if block.rows[b] == 0 and strikes_early(model, state, manner, mid, pair, block, b):
                 left[i] |= 1
     mark_misses(model, state, work, left, h)
     for i in range(N):
-        if is_large(work, i) and left[i] == 1:
+        # A neighbour has marked it; only what is not solved leaves a large island out.
+        if is_large(island, i) and left[i] == 1:
             left[i] = 0
         found = found or left[i]
     if not found:
         return False
     for i in range(N):
-        state.cluster[i], joined[i] = NONE, work.parent[i] if left[work.parent[i]] else i
+        state.cluster[i], joined[i] = NONE, island.parent[i] if left[island.parent[i]] else i
     for b in range(blocks):
-        i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-        if j >= 0 and left[island_of(work, b)]:
+        i, j = block.bodies[b, 0], block.bodies[b, 1]
+        if j >= 0 and left[island_of(body, island, block, b)]:
             join(joined, i, j)
     for s in range(state.counts[CONTACTS]):  # piles of sleepers
         i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
-        if state.pair_flags[s, 1] and not work.awake[i] and not work.awake[j]:
+        if state.pair_flags[s, 1] and not body.awake[i] and not body.awake[j]:
             join(joined, i, j)
     for i in range(N):
-        work.waits[i] = 0
+        body.waits[i] = 0
     for i in range(N):
-        if left[work.parent[i]] and work.awake[i]:
-            work.waits[root_of(joined, i)] = 1
+        if left[island.parent[i]] and body.awake[i]:
+            body.waits[root_of(joined, i)] = 1
     for i in range(N):
         r = root_of(joined, i)
-        if work.waits[r] and state.alive[i]:
+        if body.waits[r] and state.alive[i]:
             state.cluster[i], state.elapsed[i] = r, 0.0
     for i in range(N):
-        work.waits[i] = 0
+        body.waits[i] = 0
         if state.cluster[i] >= 0:
-            work.waits[i] = 1
-            work.awake[i], work.evaluated[i], work.disturbed[i] = 0, 0, 0
+            body.waits[i] = 1
+            body.awake[i], body.evaluated[i], work.sleep.disturbed[i] = 0, 0, 0
     return True
 
 
 @compiled
-def is_large(work, i):
+def is_large(island, i):
     """Return whether impacts need not be located in the island that a body represents."""
-    return work.island_start[i + 1] - work.island_start[i] > LARGE
+    return island.start[i + 1] - island.start[i] > LARGE
 
 
 @compiled
@@ -110,19 +112,19 @@ def join(forest, i, j):
 
 
 @compiled
-def strikes_early(model, state, work, b):
+def strikes_early(model, state, manner, mid, pair, block, b):
     """Return whether an open contact is pressed, and not slowly, where the bodies are not."""
-    g = work.origin[b, 2]
-    if work.origin[b, 0] == OWN_GAP:
-        i = work.origin[b, 1]
-        gap, closed, bounce = work.gap[i, g], state.touches[i, g] != 0, model.restitution[g]
+    g = block.origin[b, 2]
+    if block.origin[b, 0] == OWN_GAP:
+        i = block.origin[b, 1]
+        gap, closed, bounce = mid.gap[i, g], state.touches[i, g] != 0, model.restitution[g]
     else:
-        index, bounce = work.contact_before[work.origin[b, 1]], model.pair_restitution
-        gap = work.contact_gap[work.origin[b, 1]]
+        index, bounce = pair.before[block.origin[b, 1]], model.pair_restitution
+        gap = pair.gap[block.origin[b, 1]]
         closed = index >= 0 and state.pair_flags[index, 1] != 0
-    if closed or abs(gap) <= ZERO_GAP * model.gap_unit:
+    if closed or abs(gap) <= model.zero_gap:
         return False
-    return not is_slow(model, work, -work.impulse[b, 0] * work.delassus[b, 0], bounce)
+    return not is_slow(model, manner, -block.impulse[b, 0] * block.delassus[b, 0], bounce)
 
 
 @compiled
@@ -137,9 +139,9 @@ def rate_of(model, gradient, v, i, g):
 @compiled
 def open_gap(model, gap):
     """Return a gap; one that just vanishes has to close by as much as curvature may close it."""
-    if gap > ZERO_GAP * model.gap_unit:
+    if gap > model.zero_gap:
         return gap
-    return gap + 2.0 * CURVATURE_DEPTH * model.gap_unit
+    return gap + 2.0 * model.bending * model.gap_unit
 
 
 @compiled
@@ -149,47 +151,51 @@ def body_misses(model, state, work, i, h):
     The way is that to the next midpoint; that to this one was examined in the step before, if this
     was a whole step.
     """
-    deep, unit = 2.0 * CURVATURE_DEPTH * model.gap_unit, model.gap_unit
-    missed = h * model.tolerance * work.island_speed[i]
+    mid, velocity, ahead = work.mid, work.velocity, work.ahead
+    path, scratch = work.path, work.scratch
+    deep = 2.0 * model.bending * model.gap_unit
+    missed = h * model.tolerance * work.body.island_speed[i]
     for c in range(model.dimension):
-        work.q_next[i, c] = work.q_mid[i, c] + h * work.v_new[i, c]
-    evaluate_gaps(model, work, i, work.q_next, work.gap_next, work.gradient_next)
+        ahead.q[i, c] = mid.q[i, c] + h * velocity.new[i, c]
+    evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
     if not state.watched[i]:
-        evaluate_gaps(model, work, i, state.q, work.gap_path, work.gradient_path)
+        evaluate_gaps(model, scratch, i, state.q, path.gap, path.gradient)
     for g in range(model.restitution.size):
-        f, following = work.gap[i, g], work.gap_next[i, g]
+        f, following = mid.gap[i, g], ahead.gap[i, g]
         if state.touches[i, g]:
             if following < min(-deep, f - missed) or (g >= model.unilateral and following > deep):
                 return True
             continue
-        rate = rate_of(model, work.gradient, work.v_new, i, g)
-        after = rate_of(model, work.gradient_next, work.v_new, i, g)
-        if f > -ZERO_GAP * unit and may_vanish(open_gap(model, f), rate, following, after, h, deep):
+        rate = rate_of(model, mid.gradient, velocity.new, i, g)
+        after = rate_of(model, ahead.gradient, velocity.new, i, g)
+        if f > -model.zero_gap and may_vanish(open_gap(model, f), rate, following, after, h, deep):
             return True
-        if not state.watched[i] and work.gap_path[i, g] > 0.0:
-            before = rate_of(model, work.gradient_path, state.v, i, g)
-            rate = rate_of(model, work.gradient, state.v, i, g)
-            if may_vanish(work.gap_path[i, g], before, f, rate, 0.5 * h, ZERO_GAP * unit):
+        if not state.watched[i] and path.gap[i, g] > 0.0:
+            before = rate_of(model, path.gradient, state.v, i, g)
+            rate = rate_of(model, mid.gradient, state.v, i, g)
+            if may_vanish(path.gap[i, g], before, f, rate, 0.5 * h, model.zero_gap):
                 return True
     return False
 
 
 @compiled
-def pair_misses(model, state, work, i, j, h):
+def pair_misses(model, state, mid, velocity, path, scratch, i, j, h):
     """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`."""
-    gap, rate, zero = work.way_gap, work.way_rate, ZERO_GAP * model.gap_unit
-    deep, watched = 2.0 * CURVATURE_DEPTH * model.gap_unit, state.watched[i] and state.watched[j]
-    gaps_at(model, work, work.q_mid, work.v_new, i, j, 0.0, NEXT)
-    gaps_at(model, work, work.q_mid, work.v_new, i, j, h, FULL)
+    gap, rate, zero = scratch.way_gap, scratch.way_rate, model.zero_gap
+    deep, watched = 2.0 * model.bending * model.gap_unit, state.watched[i] and state.watched[j]
+    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, 0.0, NEXT)
+    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, h, FULL)
     if not watched:
-        gaps_at(model, work, state.q, state.v, i, j, 0.0, START)
-        gaps_at(model, work, state.q, state.v, i, j, 0.5 * h, MIDDLE)
+        gaps_at(model, path, scratch, state.q, state.v, i, j, 0.0, START)
+        gaps_at(model, path, scratch, state.q, state.v, i, j, 0.5 * h, MIDDLE)
     for g in range(model.pair_gaps):
         f0, rate0, f1, rate1 = gap[NEXT, g], rate[NEXT, g], gap[FULL, g], rate[FULL, g]
         misses = f0 > -zero and may_vanish(open_gap(model, f0), rate0, f1, rate1, h, deep)
         if not watched and not misses:
             f0, rate0, f1, rate1 = gap[START, g], rate[START, g], gap[MIDDLE, g], rate[MIDDLE, g]
             misses = f0 > 0.0 and may_vanish(f0, rate0, f1, rate1, 0.5 * h, zero)
+        # Asked last: the search in the list of contacts costs more than the rest, and misses are
+        # rare.
         if misses and not touching(model, state, i, j, g):
             return True
     return False
@@ -198,26 +204,30 @@ def pair_misses(model, state, work, i, j, h):
 @compiled
 def mark_misses(model, state, work, left, h):
     """Mark the islands with bodies that cross the boundary of a gap on their way."""
+    mid, velocity, body, path, island = work.mid, work.velocity, work.body, work.path, work.island
+    neighbours, scratch = work.neighbours, work.scratch
     if model.restitution.size > 0:
         for i in range(model.bodies):
-            if not (state.alive[i] and work.awake[i]) or is_large(work, work.parent[i]):
+            if not (state.alive[i] and body.awake[i]) or is_large(island, island.parent[i]):
                 continue
             if body_misses(model, state, work, i, h):
-                left[work.parent[i]] |= 1
+                left[island.parent[i]] |= 1
     slow = model.near_many * model.gap_unit
-    if model.pair_kernel == 0 or 2.0 * travel(model, work, h) <= slow:
+    if model.pair_kernel == 0 or 2.0 * travel(model, body, h) <= slow:
         return
-    for s in range(work.list_status[0]):
-        i, j = work.neighbours[s, 0], work.neighbours[s, 1]
-        if not (state.alive[i] and state.alive[j] and (work.awake[i] or work.awake[j])):
+    for s in range(neighbours.status[0]):
+        i, j = neighbours.pairs[s, 0], neighbours.pairs[s, 1]
+        if not (state.alive[i] and state.alive[j] and (body.awake[i] or body.awake[j])):
             continue
-        way = h * (work.speed[i] + work.speed[j])
-        large = is_large(work, work.parent[i]) and is_large(work, work.parent[j])
+        way = h * (body.speed[i] + body.speed[j])
+        large = is_large(island, island.parent[i]) and is_large(island, island.parent[j])
         if way <= slow or large:
             continue
         way = max(way, 0.5 * h * (speed_of(model, state.v, i) + speed_of(model, state.v, j)))
-        if work.least_gap[s] > 2.0 * way:
+        if neighbours.least_gap[s] > 2.0 * way:
             continue
-        if not stay_apart(model, state, work, i, j, h) and pair_misses(model, state, work, i, j, h):
-            left[work.parent[i]] |= 1
-            left[work.parent[j]] |= 1
+        if not stay_apart(model, state, mid, velocity, i, j, h) and pair_misses(
+            model, state, mid, velocity, path, scratch, i, j, h
+        ):
+            left[island.parent[i]] |= 1
+            left[island.parent[j]] |= 1

@@ -13,6 +13,7 @@ def invert(upper, at, k, mass, out):
     The result is not a number where the matrix is not definite.
     """
     never_inline()
+    # Most bodies have diagonal mass matrices; these keep exact zeros, and cost no elimination.
     diagonal = True
     for i in range(k):
         for j in range(i, k):
@@ -48,6 +49,8 @@ def factorise(A, k):
         pivot = A[j, j]
         for a in range(j):
             pivot -= A[j, a] * A[j, a]
+        # What cancels to rounding is no direction of its own; the second bound is for rows that are
+        # nearly zero, in which rounding of other rows remains.
         if pivot <= 1e-13 * A[j, j] or pivot <= 1e-26 * top:
             return False
         pivot = np.sqrt(pivot)
@@ -84,6 +87,7 @@ def add_square(A, row, weight, k):
     """Add ``weight row row'`` to the lower triangle of ``A``."""
     for i in range(k):
         f = weight * row[i]
+        # Rows of contacts with surroundings are mostly zeros.
         if f != 0.0:
             for j in range(i + 1):
                 A[i, j] += f * row[j]

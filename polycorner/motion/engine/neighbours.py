@@ -7,10 +7,6 @@ from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 
-TOUCHING = 1e-7  # scaled gap up to which a contact is made, and kept as it is
-ZERO_GAP = 1e-9  # scaled depth up to which a gap counts as zero
-DETECTION = 1e-2  # scaled gap up to which contacts are detected, at least
-
 
 @compiled
 def position_of(model, state, i, a, time):
@@ -38,6 +34,7 @@ def heap_sort(values, count):
     never_inline()
     for top in range(count // 2 - 1, -count, -1):
         start, end = top, count
+        # Both phases of the sort in one loop: negative numbers count what is left of the heap.
         if top < 0:  # the largest, on top, moves to the end
             end = count + top
             values[0], values[end] = values[end], values[0]
@@ -67,97 +64,109 @@ def pair_of(model, state, key):
 
 
 @compiled
-def is_near(model, state, work, s, limit):
+def is_near(model, state, mid, body, neighbours, s, limit):
     """Return whether a pair with an awake body may meet, and was not examined in this step yet.
 
     Bodies that wait are where they were, or already where they will be: nothing meets them.
     """
-    a, b = work.neighbours[s, 0], work.neighbours[s, 1]
-    if work.examined[s] or not (work.awake[a] or work.awake[b]):
+    a, b = neighbours.pairs[s, 0], neighbours.pairs[s, 1]
+    if neighbours.examined[s] or not (body.awake[a] or body.awake[b]):
         return False
-    work.examined[s], work.least_gap[s] = 1, 0.0
-    if not (state.alive[a] and state.alive[b]) or work.waits[a] or work.waits[b]:
+    # Set before the pair is refused, too: whoever wakes later in this step must not find the pair
+    # again, and a gap that is not known counts as zero.
+    neighbours.examined[s], neighbours.least_gap[s] = 1, 0.0
+    if not (state.alive[a] and state.alive[b]) or body.waits[a] or body.waits[b]:
         return False
-    return square_distance(model, work, a, b) < (model.reach + limit) ** 2
+    return square_distance(model, mid, a, b) < (model.reach + limit) ** 2
 
 
 @compiled
-def count_gaps(model, work, slot, limit):
+def count_gaps(model, mid, neighbours, scratch, slot, limit):
     """Return how many gaps of a pair are small; the least of all is kept."""
     count, least = ZERO, np.inf
-    evaluate_pair(model, work, work.neighbours[slot, 0], work.neighbours[slot, 1], work.q_mid)
+    evaluate_pair(model, scratch, neighbours.pairs[slot, 0], neighbours.pairs[slot, 1], mid.q)
     for g in range(model.pair_gaps):
-        gap = work.scratch[model.pair_inputs + g]
+        gap = scratch.values[model.pair_inputs + g]
         count, least = count + (ONE if gap < limit else ZERO), min(least, gap)
-    work.least_gap[slot] = least
+    # Also where it is not small: pairs that stay apart are excluded by it from looking ahead.
+    neighbours.least_gap[slot] = least
     return count
 
 
 @compiled
-def count_range(model, state, work, begin, end, limit):
+def count_range(model, state, mid, body, neighbours, scratch, begin, end, limit):
     """Count the small gaps of some pairs; return how many there are."""
     count = ZERO
     for s in range(begin, end):
-        near = is_near(model, state, work, s, limit)
-        work.meets[s] = count_gaps(model, work, s, limit) if near else ZERO
-        count += work.meets[s]
+        near = is_near(model, state, mid, body, neighbours, s, limit)
+        neighbours.meets[s] = (
+            count_gaps(model, mid, neighbours, scratch, s, limit) if near else ZERO
+        )
+        count += neighbours.meets[s]
     return count
 
 
 @compiled
-def detect_counted(model, state, work, begin, end, limit, share, count):
+def detect_counted(model, state, mid, neighbours, pair, scratch, begin, end, limit, share, count):
     """Add the small gaps of some pairs, which were counted, to the contacts after so many."""
     cursor = NONE
     for s in range(begin, end):
-        if work.meets[s]:
-            count, cursor = detect_pair(model, state, work, s, limit, share, count, cursor)
+        if neighbours.meets[s]:
+            count, cursor = detect_pair(
+                model, state, mid, neighbours, pair, scratch, s, limit, share, count, cursor
+            )
 
 
 @compiled
 def detect_all(model, state, work, pairs, limit, share, count):
     """Add the small gaps of all pairs to the contacts; return the contact count, or -1 if full."""
+    mid, neighbours, pair, scratch = work.mid, work.neighbours, work.pair, work.scratch
     cursor = NONE
     for s in range(pairs):
-        if is_near(model, state, work, s, limit):
-            count, cursor = detect_pair(model, state, work, s, limit, share, count, cursor)
+        if is_near(model, state, mid, work.body, neighbours, s, limit):
+            count, cursor = detect_pair(
+                model, state, mid, neighbours, pair, scratch, s, limit, share, count, cursor
+            )
             if count < 0:
                 return NONE
     return count
 
 
 @compiled
-def detect_pair(model, state, work, slot, limit, share, count, cursor):
+def detect_pair(model, state, mid, neighbours, pair, scratch, slot, limit, share, count, cursor):
     """Add the small gaps of a pair to the contacts; return the contact count, or -1 if full.
 
     The least of all its gaps is kept.  The cursor, which is returned as well, goes with the pairs
     through the list of the last step; both ascend.
     """
-    a, b, least = work.neighbours[slot, 0], work.neighbours[slot, 1], np.inf
-    K, scratch = model.lanes, work.scratch
+    a, b, least = neighbours.pairs[slot, 0], neighbours.pairs[slot, 1], np.inf
+    K, values = model.lanes, scratch.values
     n, m = model.pair_inputs, model.pair_gaps
-    evaluate_pair(model, work, a, b, work.q_mid)
+    evaluate_pair(model, scratch, a, b, mid.q)
     for g in range(m):
-        least = min(least, scratch[n + g])
-        if scratch[n + g] < limit:
+        least = min(least, values[n + g])
+        if values[n + g] < limit:
             # contacts between sleepers, which are kept, need room as well
             if count + state.counts[CONTACTS] >= model.contact_room:
                 return NONE, cursor
-            work.contact[count, 0], work.contact[count, 1], work.contact[count, 2] = a, b, g
-            work.contact_gap[count] = scratch[n + g]
+            pair.contact[count, 0], pair.contact[count, 1], pair.contact[count, 2] = a, b, g
+            pair.gap[count] = values[n + g]
+            # Pairs ascend, and so do keys: one pass through the list of the last step finds all of
+            # them.
             key = pair_key(model, state, a, b) * m + g
             cursor = place_among(state, key) if cursor < 0 else advanced(state, cursor, key)
             index = cursor if has_key(state, cursor, key) else NONE
-            work.contact_before[count] = index
+            pair.before[count] = index
             for c in range(state.pair_impulse.shape[1]):
                 before = state.pair_impulse[index, c] if index >= 0 else 0.0
-                work.contact_impulse[count, c] = before * share
+                pair.impulse[count, c] = before * share
             for c in range(2 * K):
-                work.contact_gradient[count, c] = 0.0
+                pair.gradient[count, c] = 0.0
             for r in range(n):
                 c = model.pair_reads[r, 0] * K + model.pair_reads[r, 1]
-                work.contact_gradient[count, c] = scratch[n + m + g * n + r]
+                pair.gradient[count, c] = values[n + m + g * n + r]
             count += 1
-    work.least_gap[slot] = least
+    neighbours.least_gap[slot] = least
     return count, cursor
 
 
@@ -172,28 +181,31 @@ def speed_of(model, v, i):
 
 
 @compiled
-def travel(model, work, h):
+def travel(model, body, h):
     """Return how far the fastest body may move in a step."""
     fastest = 0.0
     for i in range(model.bodies):
-        if work.awake[i]:
-            fastest = max(fastest, work.speed[i])
+        # Sleepers keep the speed that they had when they fell asleep.
+        if body.awake[i]:
+            fastest = max(fastest, body.speed[i])
     return h * fastest
 
 
 @compiled
-def detection_distance(model, work, h):
+def detection_distance(model, body, h):
     """Return the gap up to which contacts are detected: any body may be hit by the fastest."""
-    return DETECTION * model.gap_unit + 2.0 * travel(model, work, h)
+    # Twice: for the way to the midpoint after this one, and for a body that comes the other way.
+    return model.detection + 2.0 * travel(model, body, h)
 
 
 @compiled
-def square_distance(model, work, a, b):
+def square_distance(model, mid, a, b):
     """Return the squared distance of two bodies' positions at the midpoint."""
     far = 0.0
+    # Where a single coordinate is the position, it stands at both places and counts once.
     for d in range(0 if model.position[0] != model.position[1] else 1, 2):
         c = model.position[d]
-        x = (work.q_mid[a, c] - work.q_mid[b, c]) * model.units[c]
+        x = (mid.q[a, c] - mid.q[b, c]) * model.units[c]
         far += nearest(model, d, x) ** 2
     return far
 
@@ -233,22 +245,23 @@ def has_key(state, place, key):
 
 
 @compiled
-def key_of(model, state, work, slot):
+def key_of(model, state, pair, slot):
     """Return the key of a contact between bodies: a number that sorts by bodies and gap."""
-    a, b, g = work.contact[slot, 0], work.contact[slot, 1], work.contact[slot, 2]
+    a, b, g = pair.contact[slot, 0], pair.contact[slot, 1], pair.contact[slot, 2]
     return pair_key(model, state, a, b) * model.pair_gaps + g
 
 
 @compiled
-def order_contacts(model, state, work, contacts, ascending):
+def order_contacts(model, state, pair, contacts, ascending):
     """Order contacts by key, if they are not ``ascending``: they were not all found at once."""
-    keys = work.sort_keys
+    keys = pair.sort_keys
     for s in range(contacts):
-        work.ranked[s] = s
+        pair.ranked[s] = s
     if ascending:
         return
     for s in range(contacts):
-        keys[s] = key_of(model, state, work, s) * contacts + s
+        # The index is the last digit of the key, so that the sort carries it along.
+        keys[s] = key_of(model, state, pair, s) * contacts + s
     heap_sort(keys, contacts)
     for s in range(contacts):
-        work.ranked[s] = keys[s] % contacts
+        pair.ranked[s] = keys[s] % contacts

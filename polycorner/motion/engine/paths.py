@@ -16,10 +16,8 @@ import numpy as np
 from polycorner.motion.engine.bounds import acts
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import ZERO_GAP, find_contact, pair_key, square_distance
+from polycorner.motion.engine.neighbours import find_contact, pair_key, square_distance
 
-CURVATURE_DEPTH = 1e-4  # scaled depth to which a gap may close by its curvature within a step
-SHORTEST_PART = 1.0 / 4096.0  # of a step, to which parts are halved
 MOST_SEARCH = 80  # evaluations in the search for one contact
 NEVER = np.inf
 
@@ -29,37 +27,38 @@ START, MIDDLE, NEXT, HALF, FULL, SEARCH = range(6)
 
 
 @compiled
-def gaps_at(model, work, base, velocity, i, j, t, row):
+def gaps_at(model, path, scratch, base, velocity, i, j, t, row):
     """Evaluate all gaps, and their rates, at a time along straight paths; ``j < 0``: surroundings.
 
-    They are left in a row of ``work.way_gap`` and ``work.way_rate``.
+    They are left in a row of ``scratch.way_gap`` and ``scratch.way_rate``.
     """
-    k, gap, rate = model.dimension, work.way_gap[row], work.way_rate[row]
+    k, gap, rate = model.dimension, scratch.way_gap[row], scratch.way_rate[row]
     for c in range(k):
-        work.q_path[i, c] = base[i, c] + t * velocity[i, c]
+        path.q[i, c] = base[i, c] + t * velocity[i, c]
     if j < 0:
-        evaluate_gaps(model, work, i, work.q_path, work.gap_path, work.gradient_path)
+        # Into arrays beside those of the midpoint, which the solution of the step still needs.
+        evaluate_gaps(model, scratch, i, path.q, path.gap, path.gradient)
         for g in range(model.restitution.size):
-            gap[g], rate[g] = work.gap_path[i, g], 0.0
+            gap[g], rate[g] = path.gap[i, g], 0.0
             for c in range(k):
-                rate[g] += work.gradient_path[i, g, c] * velocity[i, c]
+                rate[g] += path.gradient[i, g, c] * velocity[i, c]
         return
     for c in range(k):
-        work.q_path[j, c] = base[j, c] + t * velocity[j, c]
-    evaluate_pair(model, work, i, j, work.q_path)
+        path.q[j, c] = base[j, c] + t * velocity[j, c]
+    evaluate_pair(model, scratch, i, j, path.q)
     n, m = model.pair_inputs, model.pair_gaps
     for g in range(m):
-        gap[g], rate[g] = work.scratch[n + g], 0.0
+        gap[g], rate[g] = scratch.values[n + g], 0.0
         for r in range(n):
             body = i if model.pair_reads[r, 0] == 0 else j
-            rate[g] += work.scratch[n + m + g * n + r] * velocity[body, model.pair_reads[r, 1]]
+            rate[g] += scratch.values[n + m + g * n + r] * velocity[body, model.pair_reads[r, 1]]
 
 
 @compiled
-def gap_at(model, work, base, velocity, i, j, g, t, out):
+def gap_at(model, path, scratch, base, velocity, i, j, g, t, out):
     """Evaluate one gap and its rate; see :func:`gaps_at`."""
-    gaps_at(model, work, base, velocity, i, j, t, SEARCH)
-    out[0], out[1] = work.way_gap[SEARCH, g], work.way_rate[SEARCH, g]
+    gaps_at(model, path, scratch, base, velocity, i, j, t, SEARCH)
+    out[0], out[1] = scratch.way_gap[SEARCH, g], scratch.way_rate[SEARCH, g]
 
 
 @compiled
@@ -67,6 +66,7 @@ def may_vanish(f0, rate0, f1, rate1, duration, slack):
     """Return whether a gap that is positive at the start may vanish on a segment."""
     if f1 < -slack:
         return True
+    # So written that a rate that is not a number excludes the gap.
     if not rate0 < 0.0 < rate1:
         return False
     meet = (f1 - f0 - rate1 * duration) / (rate0 - rate1)
@@ -74,14 +74,14 @@ def may_vanish(f0, rate0, f1, rate1, duration, slack):
 
 
 @compiled
-def first_zero(model, work, base, velocity, i, j, g, duration, slack, out):
+def first_zero(model, path, scratch, base, velocity, i, j, g, duration, slack, out):
     """Return when an open gap first vanishes on a segment, up to ``slack``.
 
     One that vanishes at the start is met if it falls there, and else once it has opened.
     """
-    gap_at(model, work, base, velocity, i, j, g, duration, out)
+    gap_at(model, path, scratch, base, velocity, i, j, g, duration, out)
     f1, rate1 = out[0], out[1]
-    gap_at(model, work, base, velocity, i, j, g, 0.0, out)
+    gap_at(model, path, scratch, base, velocity, i, j, g, 0.0, out)
     f, rate, low = out[0], out[1], 0.0
     if f <= slack:
         if rate < 0.0 and may_vanish(0.0, rate, f1, rate1, duration, slack):
@@ -89,9 +89,11 @@ def first_zero(model, work, base, velocity, i, j, g, duration, slack, out):
         if f1 >= -slack:
             return NEVER
         low = duration
+        # It starts on the boundary and is beyond it at the end: look back for an instant at which
+        # it is open.
         while f <= slack and low > 1e-9 * duration:
             low *= 0.5
-            gap_at(model, work, base, velocity, i, j, g, low, out)
+            gap_at(model, path, scratch, base, velocity, i, j, g, low, out)
             f = out[0]
         if f <= slack:
             return 0.0
@@ -99,12 +101,15 @@ def first_zero(model, work, base, velocity, i, j, g, duration, slack, out):
         return NEVER
     high, bracketed = duration, f1 < -slack
     for _ in range(MOST_SEARCH):
+        # Newton steps of a convex gap stop short of the zero, so that the way up to there is free.
         t = low - f / rate if rate < 0.0 else NEVER
         if not t < high:
             if not bracketed:
                 return NEVER
             t = 0.5 * (low + high)
-        gap_at(model, work, base, velocity, i, j, g, t, out)
+        gap_at(model, path, scratch, base, velocity, i, j, g, t, out)
+        # Half of it, so that rounding at this instant in the part that ends here does not make the
+        # gap open again.
         if abs(out[0]) <= 0.5 * slack:
             return t
         if out[0] > 0.0:
@@ -122,60 +127,63 @@ def touching(model, state, i, j, g):
 
 
 @compiled
-def first_in_gap(model, state, work, i, j, g, acting, h, out):
+def first_in_gap(model, state, mid, velocity, path, scratch, i, j, g, acting, h, out):
     """Return when in a step an open gap vanishes; one that acts may do so after its middle.
 
     Its values on the way, as in :func:`look_ahead`, exclude most gaps at once.
     """
-    slack, half, t = ZERO_GAP * model.gap_unit, 0.5 * h, NEVER
-    if may_meet(work, g, START, MIDDLE, half, slack):
-        t = first_zero(model, work, state.q, state.v, i, j, g, half, slack, out)
-    if t == NEVER and not acting and may_meet(work, g, NEXT, HALF, half, slack):
-        t = half + first_zero(model, work, work.q_mid, work.v_new, i, j, g, half, slack, out)
+    slack, half, t = model.zero_gap, 0.5 * h, NEVER
+    if may_meet(scratch, g, START, MIDDLE, half, slack):
+        t = first_zero(model, path, scratch, state.q, state.v, i, j, g, half, slack, out)
+    # What acts is kept from closing by its impulse; only others can be met with the new velocity.
+    if t == NEVER and not acting and may_meet(scratch, g, NEXT, HALF, half, slack):
+        t = half + first_zero(model, path, scratch, mid.q, velocity.new, i, j, g, half, slack, out)
     return t
 
 
 @compiled
-def may_meet(work, g, first, last, duration, slack):
+def may_meet(scratch, g, first, last, duration, slack):
     """Return whether a gap may vanish between two rows, or does so at the first."""
-    gap, rate = work.way_gap, work.way_rate
+    gap, rate = scratch.way_gap, scratch.way_rate
     f0, rate0, f1, rate1 = gap[first, g], rate[first, g], gap[last, g], rate[last, g]
     return f0 <= slack or may_vanish(f0, rate0, f1, rate1, duration, slack)
 
 
 @compiled
-def look_ahead(model, state, work, i, j, h):
+def look_ahead(model, state, mid, velocity, path, scratch, i, j, h):
     """Evaluate gaps at the start, the midpoint and the end of a step, and at the next midpoint."""
-    gaps_at(model, work, state.q, state.v, i, j, 0.0, START)
-    gaps_at(model, work, state.q, state.v, i, j, 0.5 * h, MIDDLE)
-    gaps_at(model, work, work.q_mid, work.v_new, i, j, 0.0, NEXT)
-    gaps_at(model, work, work.q_mid, work.v_new, i, j, 0.5 * h, HALF)
-    gaps_at(model, work, work.q_mid, work.v_new, i, j, h, FULL)
+    gaps_at(model, path, scratch, state.q, state.v, i, j, 0.0, START)
+    gaps_at(model, path, scratch, state.q, state.v, i, j, 0.5 * h, MIDDLE)
+    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, 0.0, NEXT)
+    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, 0.5 * h, HALF)
+    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, h, FULL)
 
 
 @compiled
-def stay_apart(model, state, work, i, j, h):
+def stay_apart(model, state, mid, velocity, i, j, h):
     """Return whether two bodies are too far apart to meet on the way to the next midpoint."""
     far = model.reach
     for d in range(0 if model.position[0] != model.position[1] else 1, 2):
         c = model.position[d]
+        # Half: with the velocity before they went half a step only.
         before = 0.5 * abs(state.v[i, c] - state.v[j, c])
-        far += h * max(before, abs(work.v_new[i, c] - work.v_new[j, c])) * model.units[c]
-    return square_distance(model, work, i, j) > far * far
+        far += h * max(before, abs(velocity.new[i, c] - velocity.new[j, c])) * model.units[c]
+    return square_distance(model, mid, i, j) > far * far
 
 
 @compiled
 def acceptable_length(model, state, work, h, out):
     """Return how long a part of a step may be: to the first contact, or half of it if one sinks."""
+    body, neighbours = work.body, work.neighbours
     length = h
     for i in range(model.bodies):
-        if state.alive[i] and work.awake[i] and model.restitution.size > 0:
+        if state.alive[i] and body.awake[i] and model.restitution.size > 0:
             length = min(length, acceptable_to(model, state, work, i, NONE, h, out))
-    for s in range(work.list_status[0] if model.pair_kernel != 0 else ZERO):
-        i, j = work.neighbours[s, 0], work.neighbours[s, 1]
-        if not (work.awake[i] and work.awake[j] and state.alive[i] and state.alive[j]):
+    for s in range(neighbours.status[0] if model.pair_kernel != 0 else ZERO):
+        i, j = neighbours.pairs[s, 0], neighbours.pairs[s, 1]
+        if not (body.awake[i] and body.awake[j] and state.alive[i] and state.alive[j]):
             continue
-        if not stay_apart(model, state, work, i, j, h):
+        if not stay_apart(model, state, work.mid, work.velocity, i, j, h):
             length = min(length, acceptable_to(model, state, work, i, j, h, out))
     return length
 
@@ -183,22 +191,30 @@ def acceptable_length(model, state, work, h, out):
 @compiled
 def acceptable_to(model, state, work, i, j, h, out):
     """Return how long a part of a step may be for the gaps of a body or of a pair."""
-    deep, length, sunk = 2.0 * CURVATURE_DEPTH * model.gap_unit, h, False
-    missed = h * model.tolerance * work.island_speed[i]  # shorter parts miss no less
-    look_ahead(model, state, work, i, j, h)
+    manner, mid, velocity = work.manner, work.mid, work.velocity
+    path, scratch = work.path, work.scratch
+    deep, length, sunk = 2.0 * model.bending * model.gap_unit, h, False
+    missed = h * model.tolerance * work.body.island_speed[i]  # shorter parts miss no less
+    look_ahead(model, state, mid, velocity, path, scratch, i, j, h)
     for g in range(model.restitution.size if j < 0 else model.pair_gaps):
         if j < 0:
             closed, bounce = state.touches[i, g] != 0, model.restitution[g]
         else:
             closed, bounce = touching(model, state, i, j, g), model.pair_restitution
-        acting = acts(model, work, work.way_gap[NEXT, g], work.way_rate[MIDDLE, g], bounce, closed)
+        acting = acts(
+            model, manner, scratch.way_gap[NEXT, g], scratch.way_rate[MIDDLE, g], bounce, closed
+        )
         if not closed:
-            length = min(length, first_in_gap(model, state, work, i, j, g, acting, h, out))
+            length = min(
+                length,
+                first_in_gap(model, state, mid, velocity, path, scratch, i, j, g, acting, h, out),
+            )
         if acting:
-            following = work.way_gap[FULL, g]
-            sunk = sunk or following < min(-deep, work.way_gap[NEXT, g] - missed)
+            following = scratch.way_gap[FULL, g]
+            sunk = sunk or following < min(-deep, scratch.way_gap[NEXT, g] - missed)
             sunk = sunk or (j < 0 and g >= model.unilateral and following > deep)
-    if sunk and h > SHORTEST_PART * model.step:
+    # A contact sinks by the square of the length: halves are a quarter as bad.
+    if sunk and h > model.shortest_part * model.step:
         length = min(length, 0.5 * h)
     return length
 
@@ -208,6 +224,8 @@ def release_time(before, now, release, h, time):
     """Return when a normal impulse vanishes if it falls on as from the last step to this one."""
     if now <= 0.0:
         return release
+    # An impulse that grows does not vanish by itself: the contact opens at the end, as far as is
+    # known.
     if before <= now:
         return time + (h if before > 0.0 else 0.5 * h)
     return time + min(0.5 * h + h * now / (before - now), 1.5 * h)

@@ -41,92 +41,99 @@ MOST_TRIES = 100  # of one part
 
 
 @compiled
-def worst_island(model, work):
+def worst_island(model, island):
     """Return the body that represents the worst island, and its residual."""
     where, worst = NONE, 0.0
     for i in range(model.bodies):
-        if work.island_start[i + 1] > work.island_start[i] and work.island_residual[i] > worst:
-            where, worst = np.int64(i), work.island_residual[i]
+        if island.start[i + 1] > island.start[i] and island.residual[i] > worst:
+            where, worst = np.int64(i), island.residual[i]
     return where, worst
 
 
 @compiled
-def record_failure(model, work, log, island, time, count):
+def record_failure(model, work, log, root, time, count):
     """Record where an island was not solved; return the number of events."""
+    velocity, island, pair = work.velocity, work.island, work.pair
+    block, search, scratch = work.block, work.search, work.scratch
     worst, place = -1.0, NONE
-    for s in range(work.island_start[island], work.island_start[island + 1]):
-        far = residual(model, work, s, s + 1, 0.0)
+    for s in range(island.start[root], island.start[root + 1]):
+        far = residual(model, velocity, block, search, scratch, s, s + 1, 0.0)
         if far > worst:
-            worst, place = far, work.order[s]
-    b = work.pressing[place] if work.pressing[place] >= 0 else place
-    i, j, g = work.block_bodies[b, 0], work.block_bodies[b, 1], work.origin[b, 2]
-    if work.block_rows[b] > 0:
+            worst, place = far, block.order[s]
+    b = block.pressing[place] if block.pressing[place] >= 0 else place
+    i, j, g = block.bodies[b, 0], block.bodies[b, 1], block.origin[b, 2]
+    if block.rows[b] > 0:
         g = NONE
-    elif work.origin[b, 0] != OWN_GAP:
-        i, j = work.contact[work.origin[b, 1], 0], work.contact[work.origin[b, 1], 1]
-    return record(log, count, FAILED, i, j, g, time, work.impulse[b, 0])
+    elif block.origin[b, 0] != OWN_GAP:
+        i, j = pair.contact[block.origin[b, 1], 0], pair.contact[block.origin[b, 1], 1]
+    return record(log, count, FAILED, i, j, g, time, block.impulse[b, 0])
 
 
 @compiled
 def gather(model, state, work, root, time, index):
     """Wake the bodies of a cluster, and let all others wait."""
+    mid, body, sleep, scratch = work.mid, work.body, work.sleep, work.scratch
     members = 0
     for i in range(model.bodies):
         inside = state.alive[i] and state.cluster[i] == root
         members += 1 if inside else 0
         if inside:
             state.watched[i] = 0
-        work.waits[i], work.evaluated[i], work.disturbed[i] = 0 if inside else 1, 0, 0
+        body.waits[i], body.evaluated[i], sleep.disturbed[i] = 0 if inside else 1, 0, 0
         if inside and state.asleep[i]:
-            others = state.neighbour_impulse
-            stays_asleep(model, state, work, i, others, model.step, time, index)  # books its work
+            # It stays what it is here; what counts is that its work is booked.
+            stays_asleep(model, state, mid, body, sleep, scratch, i, model.step, time, index)
             state.asleep[i] = 0
-        work.awake[i] = 1 if inside else 0
+        body.awake[i] = 1 if inside else 0
+        # Others wait where they are at the beginning of the step.
         if not inside:
             for c in range(model.dimension):
-                work.q_mid[i, c] = state.q[i, c]
-    work.near[0] = slow_travel(model, members)
+                mid.q[i, c] = state.q[i, c]
+    work.manner.near[0] = slow_travel(model, members)
 
 
 @compiled
 def solve_part(model, state, work, h, time, index):
     """Evaluate and solve a part of a step; return why it cannot be done, and its blocks."""
+    mid, scratch = work.mid, work.scratch
     set_time(model, time + 0.5 * h)
     for i in range(model.bodies):
-        if state.alive[i] and work.awake[i]:
-            evaluate_body(model, state, work, i, h, time + 0.5 * h, index)
+        if state.alive[i] and work.body.awake[i]:
+            evaluate_body(model, state, mid, scratch, i, h, time + 0.5 * h, index)
     return attempt(model, state, work, h, time, index, True)
 
 
 @compiled
 def refine(model, state, work, log, root, index, count):
     """Do what is left of a step for the bodies of a cluster, in parts; return why it stopped."""
+    manner = work.manner
     H, begin = model.step, index * model.step
     gather(model, state, work, root, begin + 0.5 * H, index)
     next_length, exact, parts, tried, spent = H, True, 0, 0, state.counts[SWEEPS]
     while state.elapsed[root] < H:
         if count > model.event_room:
             return EVENTS_FULL, count
-        work.located[0] = 1 if exact else 0  # what is left is done as a whole step is
+        manner.located[0] = 1 if exact else 0  # what is left is done as a whole step is
         rest, time = H - state.elapsed[root], begin + state.elapsed[root]
         h, halved = min(next_length, rest), False
-        blocks, island, worst = ZERO, NONE, 0.0
+        blocks, where, worst = ZERO, NONE, 0.0
         tries = 0
         while True:
+            # No part is left that is shorter than an instant: its impulses could not be stored.
             if rest - h <= INSTANT * H:
                 h = rest
-            work.remedy[0] = HALVED if exact and h > SHORTEST_SOLVED * H else LAST
+            manner.remedy[0] = HALVED if exact and h > SHORTEST_SOLVED * H else LAST
             why, blocks = solve_part(model, state, work, h, time, index)
             if why != DONE:
                 return why, count
-            island, worst = worst_island(model, work)
+            where, worst = worst_island(model, work.island)
             tries += 1
             if not exact or tries == MOST_TRIES:
                 break
             if worst > model.tolerance and h > SHORTEST_SOLVED * H:
                 h, halved = 0.5 * h, True
                 continue
-            length = acceptable_length(model, state, work, h, work.image)
+            length = acceptable_length(model, state, work, h, work.scratch.image)
             length = max(length, INSTANT * H)
             if length >= h:
                 break
@@ -134,10 +141,12 @@ def refine(model, state, work, log, root, index, count):
         state.sums[RESIDUAL] = max(state.sums[RESIDUAL], worst)
         if worst > model.tolerance:
             state.counts[UNSOLVED] += 1
-            count = record_failure(model, work, log, island, time + 0.5 * h, count)
+            count = record_failure(model, work, log, where, time + 0.5 * h, count)
             exact = False
         count = commit(model, state, work, log, blocks, h, time, index, True, count)
         parts, tried = parts + 1, tried + tries
+        # Chattering impacts, as of a ball that comes to rest in a wedge, would go on for ever: what
+        # has cost too much is done at once.
         allowed = MOST_SWEEPS + MEAN_SWEEPS * tried
         if exact and (parts == MOST_PARTS or state.counts[SWEEPS] - spent > allowed):
             exact = False
@@ -145,6 +154,8 @@ def refine(model, state, work, log, root, index, count):
             count = record(log, count, FAILED, root, NONE, NONE, time + h, 0.0)
         state.counts[PARTS] += 1
         state.elapsed[root] = H if h >= rest else state.elapsed[root] + h
+        # A part halved for its own sake grows again; one that ends at an impact says nothing of the
+        # next.
         next_length = 2.0 * h if halved else H
     return DONE, count
 
@@ -155,12 +166,13 @@ def count_residuals(model, state, work, log, time, count):
 
     Crowds, of which this is known, are counted only.
     """
+    island = work.island
     for i in range(model.bodies):
-        if work.island_start[i + 1] > work.island_start[i] and not work.waits[i]:
-            state.sums[RESIDUAL] = max(state.sums[RESIDUAL], work.island_residual[i])
-            if work.island_residual[i] > model.tolerance:
+        if island.start[i + 1] > island.start[i] and not work.body.waits[i]:
+            state.sums[RESIDUAL] = max(state.sums[RESIDUAL], island.residual[i])
+            if island.residual[i] > model.tolerance:
                 state.counts[UNSOLVED] += 1
-                if is_crowd(model, work.island_start[i], work.island_start[i + 1]):
+                if is_crowd(model, island.start[i], island.start[i + 1]):
                     continue
                 count = record_failure(model, work, log, np.int64(i), time, count)
     return count
@@ -184,14 +196,15 @@ def step(model, state, work, log, count):
 
     A step that was left because there was no room is taken up where it was left.
     """
+    manner, body = work.manner, work.body
     h, index, left = model.step, state.counts[STEPS], False
     for i in range(model.bodies):
         left = left or state.cluster[i] >= 0
     if not left:
         time = index * h
-        work.located[0], work.remedy[0] = 0, DIVIDED if model.refines else LAST
+        manner.located[0], manner.remedy[0] = 0, DIVIDED if model.refines else LAST
         for i in range(model.bodies):
-            work.waits[i] = 0
+            body.waits[i] = 0
         set_time(model, time + 0.5 * h)
         evaluate_bodies(model, state, work, h, time + 0.5 * h, index)
         any_awake = wake(model, state, work, h, time + 0.5 * h, index)
@@ -203,10 +216,12 @@ def step(model, state, work, log, count):
         if any_awake:
             count = count_residuals(model, state, work, log, time + 0.5 * h, count)
         for i in range(model.bodies):
-            state.watched[i] = 0 if work.waits[i] else 1
+            # After parts the next step starts with other velocities than those that were looked
+            # ahead with.
+            state.watched[i] = 0 if body.waits[i] else 1
         count = commit(model, state, work, log, blocks, h, time, index, any_awake, count)
     if left:
-        work.remedy[0] = LAST
+        manner.remedy[0] = LAST
         for i in range(model.bodies):
             if state.cluster[i] == i:
                 why, count = refine(model, state, work, log, i, index, count)

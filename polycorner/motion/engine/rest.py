@@ -10,11 +10,11 @@ REST_FACTOR = 10.0  # multiple of the tolerance up to which a velocity counts as
 
 
 @compiled
-def load_of(model, work, lam, i, f):
+def load_of(model, mid, lam, i, f):
     """Return the normal impulse that presses on a friction contact of a body."""
     pressing = model.pressing_gap[f]
     if pressing < 0:
-        return work.load[i, f]
+        return mid.load[i, f]
     return abs(lam[i, pressing]) if pressing >= model.unilateral else lam[i, pressing]
 
 
@@ -25,142 +25,150 @@ def holds(model, lam, i, g):
 
 
 @compiled
-def compliance(model, work, lam, i, g):
+def compliance(model, mid, lam, i, g):
     """Return the weight of a normal impulse in the least change that restores balance.
 
     It is the impulse squared; for an equation at least that of the impulse that would take the
     kinetic energy of all forces.
     """
     k, square, weight = model.dimension, 0.0, 0.0
+    # The square of the load makes small loads yield little: contacts that hardly press stay
+    # pressed.
     if g < model.unilateral:
         return lam[i, g] ** 2
     for c in range(k):
         for a in range(k):
-            entry = work.inverse_mass[i, c, a]
-            weight += work.gradient[i, g, c] * entry * work.gradient[i, g, a]
-            square += work.force[i, c] * entry * work.force[i, a]
+            entry = mid.inverse_mass[i, c, a]
+            weight += mid.gradient[i, g, c] * entry * mid.gradient[i, g, a]
+            square += mid.force[i, c] * entry * mid.force[i, a]
     return max(lam[i, g] ** 2, square / weight if weight > 0.0 else 0.0)
 
 
 @compiled
-def find_rest_velocity(model, work, lam, i, out):
+def find_rest_velocity(model, mid, scratch, lam, i, out):
     """Find the velocity at which no loaded contact slips or opens; return whether there is one."""
     k, F = model.dimension, model.frictions
-    A = work.body_matrix
+    A = scratch.matrix
     for c in range(k):
         out[c] = 0.0
         for a in range(k):
             A[c, a] = 0.0
     for g in range(model.restitution.size):
         if holds(model, lam, i, g):
-            add_square(A, work.gradient[i, g], 1.0, k)
+            add_square(A, mid.gradient[i, g], 1.0, k)
     for f in range(F):
-        if load_of(model, work, lam, i, f) > 0.0:
+        if load_of(model, mid, lam, i, f) > 0.0:
             for r in range(model.slip_start[f], model.slip_start[f + 1]):
-                add_square(A, work.slip_rows[i, r], 1.0, k)
+                add_square(A, mid.slip_rows[i, r], 1.0, k)
                 for c in range(k):
-                    out[c] -= work.slip_offset[i, r] * work.slip_rows[i, r, c]
+                    out[c] -= mid.slip_offset[i, r] * mid.slip_rows[i, r, c]
     if not solve_spd(A, out, k):
         return False
     top = 0.0
     for c in range(k):
         top = max(top, abs(out[c]) * model.units[c])
     for c in range(k):
+        # Exact zeros, so that the velocity of rest is the same number in each step.
         if abs(out[c]) * model.units[c] <= 1e-13 * top:
             out[c] = 0.0
-    return keeps_contacts(model, work, lam, i, out)
+    return keeps_contacts(model, mid, lam, i, out)
 
 
 @compiled
-def keeps_contacts(model, work, lam, i, v):
+def keeps_contacts(model, mid, lam, i, v):
     """Return whether no loaded contact of a body slips or opens at a velocity."""
     k = model.dimension
     for g in range(model.restitution.size):
         if holds(model, lam, i, g):
             value, size = 0.0, 0.0
             for c in range(k):
-                value += work.gradient[i, g, c] * v[c]
-                size += abs(work.gradient[i, g, c] * v[c])
+                value += mid.gradient[i, g, c] * v[c]
+                size += abs(mid.gradient[i, g, c] * v[c])
             if abs(value) > 1e-11 * size:
                 return False
     for f in range(model.frictions):
-        if load_of(model, work, lam, i, f) > 0.0:
+        if load_of(model, mid, lam, i, f) > 0.0:
             for r in range(model.slip_start[f], model.slip_start[f + 1]):
-                value = work.slip_offset[i, r]
+                value = mid.slip_offset[i, r]
                 size = abs(value)
                 for c in range(k):
-                    value += work.slip_rows[i, r, c] * v[c]
-                    size += abs(work.slip_rows[i, r, c] * v[c])
+                    value += mid.slip_rows[i, r, c] * v[c]
+                    size += abs(mid.slip_rows[i, r, c] * v[c])
                 if abs(value) > 1e-11 * size:
                     return False
     return True
 
 
 @compiled
-def remains_at_rest(model, state, work, i, others):
+def remains_at_rest(model, state, mid, sleep, scratch, i, others):
     """Return whether a body at rest provably remains so; see :func:`balances`.
 
     First the impulses of the last step are tried, if they leave some friction unused, then others.
     """
+    # The order matters: what leaves a reserve can sleep long, and is asked first.
     return (
-        balances(model, state, work, i, others, True, -SLEEP_MARGIN)
-        or balances(model, state, work, i, others, False, SET_SLACK)
-        or balances(model, state, work, i, others, True, SET_SLACK)
+        balances(model, state, mid, sleep, scratch, i, others, True, -SLEEP_MARGIN)
+        or balances(model, state, mid, sleep, scratch, i, others, False, SET_SLACK)
+        or balances(model, state, mid, sleep, scratch, i, others, True, SET_SLACK)
     )
 
 
 @compiled
-def balances(model, state, work, i, others, again, slack):
+def balances(model, state, mid, sleep, scratch, i, others, again, slack):
     """Return whether admissible impulses balance the forces on a body at rest, which proves rest.
 
     The impulses of the last step (friction under a known load only with ``again``, else zero) get
     the smallest change, weighted by the loads, that restores balance.  If the result lies in its
     sets, up to a relative slack, it proves that the body remains at rest.  It is left in
-    ``work.proof_friction`` and ``work.proof_normal``.
+    ``sleep.proof_friction`` and ``sleep.proof_normal``.
     """
     k, F, m = model.dimension, model.frictions, model.restitution.size
-    A, r = work.body_matrix, work.body_vector
-    lam, friction = work.proof_normal, work.proof_friction
+    A, r = scratch.matrix, scratch.vector
+    lam, friction = sleep.proof_normal, sleep.proof_friction
     for c in range(k):
-        r[c] = -(work.force[i, c] + work.kick[i, c]) - others[i, c]
+        r[c] = -(mid.force[i, c] + mid.kick[i, c]) - others[i, c]
         for a in range(k):
             A[c, a] = 0.0
     for g in range(m):
         lam[i, g] = state.normal[i, g]
         if holds(model, lam, i, g):
-            add_square(A, work.gradient[i, g], compliance(model, work, lam, i, g), k)
+            add_square(A, mid.gradient[i, g], compliance(model, mid, lam, i, g), k)
             for c in range(k):
-                r[c] -= lam[i, g] * work.gradient[i, g, c]
+                r[c] -= lam[i, g] * mid.gradient[i, g, c]
     for f in range(F):
-        load = load_of(model, work, state.normal, i, f)
+        load = load_of(model, mid, state.normal, i, f)
+        # From zero the least change is the impulse farthest from slipping; from that of the last
+        # step it follows loads that change slowly.
         central = model.pressing_gap[f] < 0 and not again
         for a in range(2):
             friction[i, f, a] = 0.0 if central else state.friction[i, f, a]
         if load > 0.0:
             for row in range(model.slip_start[f], model.slip_start[f + 1]):
-                add_square(A, work.slip_rows[i, row], load * load, k)
+                add_square(A, mid.slip_rows[i, row], load * load, k)
                 for c in range(k):
-                    r[c] -= friction[i, f, row - model.slip_start[f]] * work.slip_rows[i, row, c]
-    if not keeps_contacts(model, work, state.normal, i, state.v[i]) or not solve_spd(A, r, k):
+                    r[c] -= friction[i, f, row - model.slip_start[f]] * mid.slip_rows[i, row, c]
+    # Where the contacts do not hold the body in all directions the matrix is singular, and its rest
+    # is not proved by them.
+    if not keeps_contacts(model, mid, state.normal, i, state.v[i]) or not solve_spd(A, r, k):
         return False
     for g in range(m):
         if holds(model, lam, i, g):
             change = 0.0
             for c in range(k):
-                change += work.gradient[i, g, c] * r[c]
-            lam[i, g] += compliance(model, work, state.normal, i, g) * change
+                change += mid.gradient[i, g, c] * r[c]
+            lam[i, g] += compliance(model, mid, state.normal, i, g) * change
             if lam[i, g] < 0.0 and g < model.unilateral:
                 return False
     for f in range(F):
-        before = load_of(model, work, state.normal, i, f)
+        before = load_of(model, mid, state.normal, i, f)
         if before <= 0.0:
             continue
         for row in range(model.slip_start[f], model.slip_start[f + 1]):
             change = 0.0
             for c in range(k):
-                change += work.slip_rows[i, row, c] * r[c]
+                change += mid.slip_rows[i, row, c] * r[c]
             friction[i, f, row - model.slip_start[f]] += before * before * change
-        load = load_of(model, work, lam, i, f)
+        load = load_of(model, mid, lam, i, f)
         if not contains(
             model, model.friction_sets[f, 0], friction[i, f, 0], friction[i, f, 1], load, slack
         ):
@@ -175,24 +183,31 @@ def comes_to_rest(model, state, work, i, rest):
     It falls asleep if it was at rest before, so that its impulses are in balance, and if they prove
     that it remains at rest.
     """
+    mid, velocity, sleep, scratch = work.mid, work.velocity, work.sleep, work.scratch
     k = model.dimension
     for f in range(model.frictions):
-        if load_of(model, work, state.normal, i, f) > 0.0 and not state.sticks[i, f]:
+        if load_of(model, mid, state.normal, i, f) > 0.0 and not state.sticks[i, f]:
             return False
-    if not find_rest_velocity(model, work, state.normal, i, rest):
+    if not find_rest_velocity(model, mid, scratch, state.normal, i, rest):
         return False
-    size, far, old = work.island_speed[i], 0.0, 0.0
+    size, far, old = work.body.island_speed[i], 0.0, 0.0
     for c in range(k):
         unit = model.units[c]
         size = max(size, abs(rest[c]) * unit)
-        far = max(far, abs(work.v_new[i, c] - rest[c]) * unit)
+        far = max(far, abs(velocity.new[i, c] - rest[c]) * unit)
         old = max(old, abs(state.v[i, c] - rest[c]) * unit)
     if far > REST_FACTOR * model.tolerance * size:
         return False
+    # It keeps its bits: a velocity computed anew would differ in the last ones, and work would be
+    # booked for them.
     still = old <= 1e-13 * size
     for c in range(k):
-        work.v_new[i, c] = state.v[i, c] if still else rest[c]
-    others = work.neighbour_impulse
-    if still and not work.located[0] and remains_at_rest(model, state, work, i, others):
+        velocity.new[i, c] = state.v[i, c] if still else rest[c]
+    others = sleep.neighbour_impulse
+    if (
+        still
+        and not work.manner.located[0]
+        and remains_at_rest(model, state, mid, sleep, scratch, i, others)
+    ):
         state.asleep[i] = 1
     return True

@@ -50,10 +50,10 @@ def add_row(model, rows, at, factor, v, i, j):
 
 
 @compiled
-def add_rows(model, work, rows, b, f, g, v, i, j):
+def add_rows(model, block, rows, b, f, g, v, i, j):
     """Add ``f`` times the first row of a block and ``g`` times the second, if there is one."""
     at = row_at(model, b, 0)
-    if work.block_rows[b] == 2:
+    if block.rows[b] == 2:
         add_two_rows(model, rows, at, f, at + 2 * model.lanes, g, v, i, j)
     else:
         add_row(model, rows, at, f, v, i, j)
@@ -86,41 +86,41 @@ def copy_velocity(model, source, target, i):
 
 
 @compiled
-def velocity_of(model, work, b, v, out):
+def velocity_of(model, block, b, v, out):
     """Evaluate the velocities ``J v + d`` of a block's rows."""
-    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-    for r in range(max(1, work.block_rows[b])):
-        product = row_times(model, work.jacobian, row_at(model, b, r), v, i, j)
-        out[r] = work.offset[b, r] + product
+    i, j = block.bodies[b, 0], block.bodies[b, 1]
+    for r in range(max(1, block.rows[b])):
+        product = row_times(model, block.jacobian, row_at(model, b, r), v, i, j)
+        out[r] = block.offset[b, r] + product
 
 
 @compiled
-def load_on(work, b):
+def load_on(block, b):
     """Return the load on a friction contact: known, or an impulse, of an equation its magnitude."""
-    pressing = work.pressing[b]
+    pressing = block.pressing[b]
     if pressing < 0:
-        return work.block_load[b]
-    p = work.impulse[pressing, 0]
-    return -p if p < 0.0 and work.bilateral[pressing] else p
+        return block.load[b]
+    p = block.impulse[pressing, 0]
+    return -p if p < 0.0 and block.bilateral[pressing] else p
 
 
 @compiled
-def apply_impulses(model, work, b, along, across):
+def apply_impulses(model, velocity, block, b, along, across):
     """Add impulses of the rows of a block to the velocities of its bodies."""
-    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
+    i, j = block.bodies[b, 0], block.bodies[b, 1]
     if along != 0.0 or across != 0.0:
-        add_rows(model, work, work.response, b, along, across, work.v_new, i, j)
+        add_rows(model, block, block.response, b, along, across, velocity.new, i, j)
 
 
 @compiled
-def speed_at(work, b):
+def speed_at(body, block, b):
     """Return the largest velocity in the island of a block."""
-    i, j = work.block_bodies[b, 0], work.block_bodies[b, 1]
-    return work.island_speed[i] if j < 0 else max(work.island_speed[i], work.island_speed[j])
+    i, j = block.bodies[b, 0], block.bodies[b, 1]
+    return body.island_speed[i] if j < 0 else max(body.island_speed[i], body.island_speed[j])
 
 
 @compiled
-def sticks(model, work, b):
+def sticks(model, body, block, b):
     """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
-    slip = abs(work.after[b, 0]) + (abs(work.after[b, 1]) if work.block_rows[b] == 2 else 0.0)
-    return slip <= 2.0 * model.tolerance * speed_at(work, b)
+    slip = abs(block.after[b, 0]) + (abs(block.after[b, 1]) if block.rows[b] == 2 else 0.0)
+    return slip <= 2.0 * model.tolerance * speed_at(body, block, b)

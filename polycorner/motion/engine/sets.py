@@ -12,6 +12,7 @@ def contains(model, shape, x, y, load, slack):
     """Return whether ``(x, y)`` lies in ``load`` times a set, up to a relative slack."""
     kind = model.set_kinds[shape]
     a, b = model.set_sizes[shape, 0], model.set_sizes[shape, 1]
+    # Relative to the load, so that the same slack does for all sets.
     top = load * (1.0 + slack)
     if kind == INTERVAL:
         return a * top <= x <= b * top
@@ -37,6 +38,7 @@ def project(model, shape, x, y, load, out):
     kind = model.set_kinds[shape]
     a, b = model.set_sizes[shape, 0], model.set_sizes[shape, 1]
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, 1.0, 0.0, 0.0, 1.0
+    # Without load friction is zero, whatever it is told.
     if load <= 0.0:
         for a in range(6):
             out[a] = 0.0
@@ -162,6 +164,8 @@ def barrier(model, shape, load, x, y, out):
     if kind == INTERVAL:
         add_linear_barrier(-a, 1.0, 0.0, load, x, y, out)
         add_linear_barrier(b, -1.0, 0.0, load, x, y, out)
+        # Nothing acts across an interval: the one keeps the Hessian definite, with zero gradient
+        # there.
         out[8] = 1.0
     elif kind == DISC:
         add_quadratic_barrier(a, a, load, x, y, out)

@@ -7,7 +7,7 @@ from polycorner.motion.bodies import IdenticalBodies
 WIDTH = 4  # reals in a vector
 MOST_ENTRIES = 48  # of a body above the diagonal of the matrix, on average, at most
 AT_ONCE = 256  # bodies, pairs, contacts or blocks that a thread does at once
-STRIPS = 128  # into which a crowd is divided, at most
+MOST_STRIPS = 128  # into which a crowd is divided, at most
 EVENTS = 4096  # events after which no step begins before the engine returns
 
 
@@ -75,6 +75,6 @@ class Sizes(NamedTuple):
             W=max(kernels) + 16,
             Q=entries,
             M=(N + 2 * entries) * lanes * lanes,
-            Z=STRIPS,
+            Z=MOST_STRIPS,
             V=max(N, pairs, blocks) // AT_ONCE + 1,
         )

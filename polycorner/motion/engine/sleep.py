@@ -35,19 +35,21 @@ def wake(model, state, work, h, time, index):
     A sleeper with friction to spare is not checked until the reserve could be used up, at the rate
     at which its forces changed before the last check.
     """
+    mid, body, sleep, scratch = work.mid, work.body, work.sleep, work.scratch
     any_awake = False
     for i in range(model.bodies):
-        work.awake[i], work.evaluated[i], work.disturbed[i] = 0, 0, 0
+        body.awake[i], body.evaluated[i], sleep.disturbed[i] = 0, 0, 0
         if not state.alive[i]:
             continue
+        # Its midpoint is needed by neighbours that are awake.
         if state.asleep[i] and state.check_due[i] > index:
             for c in range(model.dimension):
-                work.q_mid[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
+                mid.q[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
             continue
         if not state.asleep[i]:
-            work.evaluated[i], work.awake[i], any_awake = 1, 1, True
-        elif not stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index):
-            work.awake[i], any_awake = 1, True
+            body.evaluated[i], body.awake[i], any_awake = 1, 1, True
+        elif not stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index):
+            body.awake[i], any_awake = 1, True
     if any_awake and model.pair_kernel != 0:
         wake_piles(model, state, work, h, time, index)
     return any_awake
@@ -56,12 +58,13 @@ def wake(model, state, work, h, time, index):
 @compiled
 def wake_piles(model, state, work, h, time, index):
     """Wake the whole pile at rest around each body that woke; see :func:`find_equilibrium`."""
-    N, root, disturbed, moving = model.bodies, work.parent, work.disturbed, work.cursor
+    mid, body, sleep, island, scratch = work.mid, work.body, work.sleep, work.island, work.scratch
+    N, root, disturbed, moving = model.bodies, island.parent, sleep.disturbed, island.cursor
     woken = False
     for i in range(N):
         root[i] = i
         disturbed[i], moving[i] = 0, 0
-        woken = woken or (state.asleep[i] and work.awake[i])
+        woken = woken or (state.asleep[i] and body.awake[i])
     if not woken:
         return
     for s in range(state.counts[CONTACTS]):
@@ -74,36 +77,39 @@ def wake_piles(model, state, work, h, time, index):
             r = root_of(root, i)
             if not state.rests[i]:
                 moving[r] = 1
-            if state.asleep[i] and work.awake[i]:
+            if state.asleep[i] and body.awake[i]:
                 disturbed[r] = 1
     for i in range(N):
         r = root_of(root, i)
-        if state.alive[i] and not work.awake[i] and disturbed[r] and not moving[r]:
-            if not work.evaluated[i]:
-                stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index)
-            work.awake[i] = 1
+        if state.alive[i] and not body.awake[i] and disturbed[r] and not moving[r]:
+            if not body.evaluated[i]:
+                stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index)
+            body.awake[i] = 1
 
 
 @compiled
-def stays_asleep(model, state, work, i, others, h, time, index):
+def stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index):
     """Evaluate a body; return whether it stays asleep, and book the work on it since."""
-    work.evaluated[i] = 1
-    evaluate_body(model, state, work, i, h, time, index)
+    body.evaluated[i] = 1
+    evaluate_body(model, state, mid, scratch, i, h, time, index)
+    # It was woken in this step already; only its evaluation was wanted.
     if not state.asleep[i]:
         return False
-    asleep = remains_at_rest(model, state, work, i, others)
+    asleep = remains_at_rest(model, state, mid, sleep, scratch, i, state.neighbour_impulse)
     steps = index - state.booked_to[i]
     if steps > 0:  # by the trapezoidal rule, if there is a new value
+        # A body that wakes has no impulses of rest in this step: those of the last check count for
+        # all steps since.
         share = 0.5 * steps if asleep else 0.0
         for f in range(model.frictions):
             for r in range(model.slip_start[f + 1] - model.slip_start[f]):
-                before, now = state.booked_friction[i, f, r], work.proof_friction[i, f, r]
+                before, now = state.booked_friction[i, f, r], sleep.proof_friction[i, f, r]
                 p = (steps - share) * before + share * now
-                state.sums[SUBSTRATE_WORK] -= p * work.slip_offset[i, model.slip_start[f] + r]
+                state.sums[SUBSTRATE_WORK] -= p * mid.slip_offset[i, model.slip_start[f] + r]
                 if asleep:
                     state.booked_friction[i, f, r] = now
         for c in range(model.dimension):
-            before, now = state.booked_applied[i, c], work.applied[i, c]
+            before, now = state.booked_applied[i, c], mid.applied[i, c]
             mean = (steps - share) * before + share * now
             state.sums[APPLIED_WORK] += mean * state.v[i, c]
             if asleep:
@@ -113,14 +119,14 @@ def stays_asleep(model, state, work, i, others, h, time, index):
 
 
 @compiled
-def next_check(model, state, work, i, h, index):
+def next_check(model, state, mid, sleep, i, h, index):
     """Return the step in which a sleeper is checked again."""
     rate = 0.0
     for f in range(model.frictions):
-        load = load_of(model, work, work.proof_normal, i, f)
+        load = load_of(model, mid, sleep.proof_normal, i, f)
         if load <= 0.0:
             continue
-        x, y = work.proof_friction[i, f, 0], work.proof_friction[i, f, 1]
+        x, y = sleep.proof_friction[i, f, 0], sleep.proof_friction[i, f, 1]
         if not contains(model, model.friction_sets[f, 0], x, y, load * (1.0 - SLEEP_MARGIN), 0.0):
             return index + 1
         change = abs(x - state.friction[i, f, 0]) + abs(y - state.friction[i, f, 1])
@@ -129,12 +135,15 @@ def next_check(model, state, work, i, h, index):
         return index + 1
     steps = LONGEST_SLEEP
     if rate * LONGEST_SLEEP > 0.1 * SLEEP_MARGIN:
+        # A tenth of the reserve: the rate is that of the last change only.
         steps = np.int64(0.1 * SLEEP_MARGIN / rate)
     for c in range(model.dimension):
+        # Forces that are drawn anew in each step have no rate.
         if model.kicks[c] > 0.0:
             return index + 1
     for g in range(model.restitution.size):
-        if holds(model, work.proof_normal, i, g):
+        # Impulses of contacts depend on each other; only known loads change slowly by themselves.
+        if holds(model, sleep.proof_normal, i, g):
             return index + 1
     if model.chatter > 0.0:  # the next draw comes at a known time
         now = np.floor((index + 0.5) * h / model.correlation_time)
@@ -149,43 +158,48 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
 
     Sleepers on which an island acts that is not solved wake up, too.
     """
+    mid, body, sleep = work.mid, work.body, work.sleep
+    island, block, scratch = work.island, work.block, work.scratch
     k, N = model.dimension, model.bodies
     if not model.may_rest:
         return False  # nothing sleeps
     for i in range(N):
-        work.disturbed[i] = 0
+        sleep.disturbed[i] = 0
         for c in range(k):
-            work.neighbour_impulse[i, c] = 0.0
+            sleep.neighbour_impulse[i, c] = 0.0
     for s in range(state.counts[CONTACTS]):
         i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
-        if work.awake[i] or work.awake[j]:
-            work.disturbed[i] = work.disturbed[j] = 1
+        if body.awake[i] or body.awake[j]:
+            sleep.disturbed[i] = sleep.disturbed[j] = 1
             continue
         for c in range(k):
-            work.neighbour_impulse[i, c] += state.pair_action[s, c]
-            work.neighbour_impulse[j, c] += state.pair_action[s, k + c]
+            sleep.neighbour_impulse[i, c] += state.pair_action[s, c]
+            sleep.neighbour_impulse[j, c] += state.pair_action[s, k + c]
     for b in range(blocks):
-        if work.origin[b, 0] in (PAIR_GAP, PAIR_FRICTION):
+        if block.origin[b, 0] in (PAIR_GAP, PAIR_FRICTION):
             for side in range(2):
-                i = work.block_bodies[b, side]
-                solved = work.island_residual[island_of(work, b)] <= model.tolerance
-                work.disturbed[i] |= 1 if solved else 2
-                for r in range(max(1, work.block_rows[b])):
-                    p = work.impulse[b, r]
+                i = block.bodies[b, side]
+                solved = island.residual[island_of(body, island, block, b)] <= model.tolerance
+                # An island that is not solved has no impulses that could prove anything: its
+                # sleepers wake.
+                sleep.disturbed[i] |= 1 if solved else 2
+                for r in range(max(1, block.rows[b])):
+                    p = block.impulse[b, r]
+                    # Most contacts of a heap are open.
                     if p == 0.0:
                         continue
                     for c in range(k):
-                        slope = work.jacobian[b, r, side * model.lanes + c]
-                        work.neighbour_impulse[i, c] += slope * p
+                        slope = block.jacobian[b, r, side * model.lanes + c]
+                        sleep.neighbour_impulse[i, c] += slope * p
     woken = False
     for i in range(N):
-        if work.disturbed[i] and state.alive[i] and not (work.awake[i] or work.waits[i]):
-            if not work.evaluated[i]:
-                stays_asleep(model, state, work, i, state.neighbour_impulse, h, time, index)
-            if work.disturbed[i] & 2 or not remains_at_rest(
-                model, state, work, i, work.neighbour_impulse
+        if sleep.disturbed[i] and state.alive[i] and not (body.awake[i] or body.waits[i]):
+            if not body.evaluated[i]:
+                stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index)
+            if sleep.disturbed[i] & 2 or not remains_at_rest(
+                model, state, mid, sleep, scratch, i, sleep.neighbour_impulse
             ):
-                work.awake[i] = 1
+                body.awake[i] = 1
                 woken = True
     return woken
 
@@ -193,32 +207,34 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
 @compiled
 def settle(model, state, work, h, index):
     """Give bodies that came to rest exactly the velocity of rest; update sleepers."""
+    mid, body, sleep = work.mid, work.body, work.sleep
     k = model.dimension
-    rest = work.rest_velocity
+    rest = work.scratch.rest_velocity
     for i in range(model.bodies):
         if not state.alive[i]:
             continue
-        if work.awake[i]:
+        if body.awake[i]:
             state.rests[i], state.asleep[i] = 0, 0
             if model.may_rest and comes_to_rest(model, state, work, i, rest):
                 state.rests[i] = 1
-        if work.awake[i] or work.disturbed[i]:
+        if body.awake[i] or sleep.disturbed[i]:
             for c in range(k):
-                state.neighbour_impulse[i, c] = work.neighbour_impulse[i, c]
-        if work.awake[i]:
+                state.neighbour_impulse[i, c] = sleep.neighbour_impulse[i, c]
+        if body.awake[i]:
             state.booked_to[i], state.check_due[i] = index + 1, index + 1
-        if state.asleep[i] and work.evaluated[i]:
-            if not work.awake[i]:
+        # What proves rest becomes the state, from which the next proof starts.
+        if state.asleep[i] and body.evaluated[i]:
+            if not body.awake[i]:
                 state.booked_to[i] = index + 1
-                state.check_due[i] = next_check(model, state, work, i, h, index)
+                state.check_due[i] = next_check(model, state, mid, sleep, i, h, index)
             for f in range(model.frictions):
                 for r in range(2):
-                    state.friction[i, f, r] = work.proof_friction[i, f, r]
-                    state.booked_friction[i, f, r] = work.proof_friction[i, f, r]
+                    state.friction[i, f, r] = sleep.proof_friction[i, f, r]
+                    state.booked_friction[i, f, r] = sleep.proof_friction[i, f, r]
             for c in range(k):
-                state.booked_applied[i, c] = work.applied[i, c]
+                state.booked_applied[i, c] = mid.applied[i, c]
             for g in range(model.restitution.size):
-                before, now = state.normal[i, g], work.proof_normal[i, g]
+                before, now = state.normal[i, g], sleep.proof_normal[i, g]
                 release = release_time(before, now, state.release[i, g], h, index * h)
                 state.normal[i, g], state.pressed[i, g] = now, now
                 state.release[i, g] = release

@@ -32,13 +32,12 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.blocks import renew_blocks
 from polycorner.motion.engine.contact_list import EXIT, MOTION, REST, record, record_contacts
-from polycorner.motion.engine.crowds import is_crowd
+from polycorner.motion.engine.crowds import is_crowd, renew_ranks
 from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbour_list import list_neighbours, outdated
 from polycorner.motion.engine.neighbours import pair_of
-from polycorner.motion.engine.ranks import renew_ranks
 from polycorner.motion.engine.sleep import settle, wake_neighbours
 from polycorner.motion.engine.solution import (
     assemble_blocks,
@@ -60,15 +59,17 @@ def solve(model, state, work, h, time, index, solved):
     If ``solved`` blocks were solved before, with other forces, they remain, and start from the
     impulses found.  Return whether all contacts fit in the workspace, and the number of blocks.
     """
-    contacts, blocks = work.list_status[2] if solved else ZERO, solved
+    manner, mid, body = work.manner, work.mid, work.body
+    island, neighbours, pair = work.island, work.neighbours, work.pair
+    contacts, blocks = neighbours.status[2] if solved else ZERO, solved
     if model.pair_kernel != 0 and not solved:
-        renew_ranks(model, state, work, index)
-        if outdated(model, state, work, h, time) and not list_neighbours(
-            model, state, work, h, time
+        renew_ranks(model, state, manner, mid, neighbours, pair, index)
+        if outdated(model, state, body, neighbours, h, time) and not list_neighbours(
+            model, state, body, island, neighbours, pair, h, time
         ):
             return False, blocks
-        for s in range(work.list_status[0]):
-            work.examined[s] = 0
+        for s in range(neighbours.status[0]):
+            neighbours.examined[s] = 0
     while True:
         found = contacts
         if solved:
@@ -85,42 +86,41 @@ def solve(model, state, work, h, time, index, solved):
             model, state, work, blocks, h, time + 0.5 * h, index
         ):
             break
-        unsettle(model, work)
+        unsettle(model, island)
         start_bodies(model, state, work, h)
+        # Bodies that woke bring new blocks: all are assembled anew.
         solved = ZERO
-    work.list_status[2] = contacts
+    neighbours.status[2] = contacts
     return True, blocks
 
 
 @compiled
-def unsettle(model, work):
+def unsettle(model, island):
     """Let all islands be solved."""
     for i in range(model.bodies):
-        work.stage[i] = SOLVED
+        island.stage[i] = SOLVED
 
 
 @compiled
-def next_round(model, work):
+def next_round(model, island):
     """Let the islands be solved again that have changed; return whether there are any.
 
     Crowds are left as they are.
     """
     found = False
     for i in range(model.bodies):
-        crowd = is_crowd(model, work.island_start[i], work.island_start[i + 1])
-        changed = work.stage[i] == CHANGED and not crowd
-        work.stage[i] = SOLVED if changed else SETTLED
+        crowd = is_crowd(model, island.start[i], island.start[i + 1])
+        changed = island.stage[i] == CHANGED and not crowd
+        island.stage[i] = SOLVED if changed else SETTLED
         found = found or changed
     return found
 
 
 @compiled
-def unsolved(model, work):
+def unsolved(model, island):
     """Return whether an island is not solved to the tolerance."""
     for i in range(model.bodies):
-        if work.island_start[i + 1] > work.island_start[i] and (
-            work.island_residual[i] > model.tolerance
-        ):
+        if island.start[i + 1] > island.start[i] and (island.residual[i] > model.tolerance):
             return True
     return False
 
@@ -133,8 +133,9 @@ def attempt(model, state, work, h, time, index, any_awake):
     several times, except for islands that have settled.  A part of a step that is not solved is
     left at that.  Return why it cannot be done, or DONE, and the number of blocks.
     """
+    island = work.island
     blocks = ZERO
-    unsettle(model, work)
+    unsettle(model, island)
     for _ in range(FORCE_ROUNDS):
         if not start_bodies(model, state, work, h):
             return NOT_FINITE, blocks
@@ -143,15 +144,16 @@ def attempt(model, state, work, h, time, index, any_awake):
         fits, blocks = solve(model, state, work, h, time, index, blocks)
         if not fits:
             return CONTACTS_FULL, blocks
-        if not model.follows_velocity or (work.located[0] and unsolved(model, work)):
+        # Forces need not follow in a part that is going to be halved.
+        if not model.follows_velocity or (work.manner.located[0] and unsolved(model, island)):
             break
         follow_curvature(model, state, work, blocks, h)
         update_forces(model, state, work, h)
-        if not next_round(model, work):
+        if not next_round(model, island):
             break
     for i in range(model.bodies):
         for c in range(model.dimension):
-            if state.alive[i] and not np.isfinite(work.v_new[i, c]):
+            if state.alive[i] and not np.isfinite(work.velocity.new[i, c]):
                 return NOT_FINITE, blocks
     return DONE, blocks
 
@@ -159,34 +161,37 @@ def attempt(model, state, work, h, time, index, any_awake):
 @compiled
 def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
     """Book, record and make a step that was solved; return the number of events."""
+    body, sleep = work.body, work.sleep
     k, N = model.dimension, model.bodies
+    # Before velocities change: it compares with the state before the step.
     observe(model, state, work, blocks, h, time)
     if any_awake:
-        count = record_contacts(work, log, blocks, count)
+        count = record_contacts(work.pair, work.block, work.event, log, blocks, count)
         if model.pair_kernel != 0:
             count = list_contacts(model, state, work, log, h, time, count)
     for i in range(N):
-        work.rested[i] = state.rests[i]
+        sleep.rested[i] = state.rests[i]
     settle(model, state, work, h, index)
     for i in range(N):
-        if not state.alive[i] or work.waits[i]:
+        if not state.alive[i] or body.waits[i]:
             continue
-        if work.awake[i] and state.rests[i] != work.rested[i]:
+        if body.awake[i] and state.rests[i] != sleep.rested[i]:
             kind = REST if state.rests[i] else MOTION
             when = time + h if state.rests[i] else time
             count = record(log, count, kind, i, NONE, NONE, when, 0.0)
         for c in range(k):
-            if work.awake[i]:
-                state.v[i, c] = work.v_new[i, c]
-            state.q[i, c] = work.q_mid[i, c] + 0.5 * h * state.v[i, c]
-            if model.crowd_sweeps > 0 and work.awake[i]:
-                state.q[i, c] += work.shift[i, c]
+            if body.awake[i]:
+                state.v[i, c] = work.velocity.new[i, c]
+            state.q[i, c] = work.mid.q[i, c] + 0.5 * h * state.v[i, c]
+            if model.crowd_sweeps > 0 and body.awake[i]:
+                state.q[i, c] += work.crowd.shift[i, c]
         if model.exit_coordinate >= 0 and state.q[i, model.exit_coordinate] > model.exit_limit:
             state.alive[i] = 0
             count = record(log, count, EXIT, i, NONE, NONE, time + h, 0.0)
             for s in range(state.counts[CONTACTS]):
                 one, two = pair_of(model, state, state.keys[s] // model.pair_gaps)
                 if i in (one, two):
+                    # What it held up has to be asked at once whether it still rests.
                     state.check_due[one] = state.check_due[two] = 0
                     state.asleep[one] = state.asleep[two] = 0
     return count

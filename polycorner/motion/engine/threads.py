@@ -11,50 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.motion.engine.allocation import initial_array
-from polycorner.motion.engine.arrays import Work, declarations
+from polycorner.motion.engine.arrays import Work
 from polycorner.motion.engine.codes import STOP
-from polycorner.motion.engine.sizes import Sizes
 
-# What is in the making: every thread has arrays of its own.
-OWN = (
-    "scratch",
-    "pair_gap_next",
-    "way_gap",
-    "way_rate",
-    "own_block",
-    "equation_rows",
-    "body_matrix",
-    "body_vector",
-    "rest_velocity",
-    "slip",
-    "image",
-    "members",
-    "number",
-    "listed",
-    "degree",
-    "first_of_degree",
-    "queue",
-    "first_neighbour",
-    "link",
-    "link_status",
-    "mark",
-    "place",
-    "row_start",
-    "columns",
-    "island_vector",
-    "matrix",
-)
 ASSIST = -1  # in place of a number of steps
-
-
-def copies(work: Work, sizes: Sizes, threads: int) -> list[Work]:
-    """Return the workspaces of further threads."""
-    declared = declarations(Work)
-    return [
-        work._replace(**{name: initial_array(declared[name], sizes) for name in OWN})
-        for _ in range(threads - 1)
-    ]
 
 
 @contextmanager
@@ -70,13 +30,13 @@ def assisted(
     if not addresses:
         yield
         return
-    work.signals[STOP] = 0
+    work.shared.signals[STOP] = 0
     with ThreadPoolExecutor(len(addresses), "polycorner-motion") as pool:
         ended = [pool.submit(advance, tables, ASSIST) for tables in addresses]
         try:
             yield
         finally:
-            work.signals[STOP] = 1
+            work.shared.signals[STOP] = 1
     for thread in ended:
         thread.result()
 

@@ -32,17 +32,17 @@ def test_all_contacts_of_a_large_island_obey_the_inclusion():
     for _ in range(100):
         engine.advance(1)
         work = engine.work
-        for root in np.flatnonzero(np.diff(work.island_start) > CROWD):
-            blocks = work.order[work.island_start[root] : work.island_start[root + 1]]
-            bodies = np.unique(work.block_bodies[blocks])
+        for root in np.flatnonzero(np.diff(work.island.start) > CROWD):
+            blocks = work.block.order[work.island.start[root] : work.island.start[root + 1]]
+            bodies = np.unique(work.block.bodies[blocks])
             bodies = bodies[bodies >= 0]
             if engine.motion.rests[bodies].any():
                 continue
             far, v = residuals(work, blocks, MU)
-            assert far.max() <= 1.001 * TOLERANCE * work.island_speed[root]
-            np.testing.assert_allclose(v[bodies], work.v_new[bodies], atol=1e-8)
-            normal = blocks[work.block_rows[blocks] == 0]
-            large, left_out = large + 1, left_out + int((work.impulse[normal, 0] == 0).sum())
+            assert far.max() <= 1.001 * TOLERANCE * work.body.island_speed[root]
+            np.testing.assert_allclose(v[bodies], work.velocity.new[bodies], atol=1e-8)
+            normal = blocks[work.block.rows[blocks] == 0]
+            large, left_out = large + 1, left_out + int((work.block.impulse[normal, 0] == 0).sum())
     assert engine.effort.unconverged == 0
     assert large > 30
     assert left_out > 100

@@ -1,5 +1,7 @@
 """Declarations of the engine's arrays: shapes, allocation, growth."""
 
+from typing import get_type_hints
+
 import numpy as np
 import pytest
 
@@ -8,9 +10,9 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.motion.contacts import velocities
 from polycorner.motion.engine.allocation import allocate, filled, restored
 from polycorner.motion.engine.arrays import (
+    EngineState,
     Log,
     Model,
-    State,
     Work,
     declarations,
     real,
@@ -36,7 +38,10 @@ def test_sizes_count_what_bodies_have():
     assert (SIZES.P, SIZES.B) == (3, 3 * 5 + 2 * 16)
 
 
-@pytest.mark.parametrize("record", [State, Work, Log])
+PARTS = tuple(get_type_hints(Work).values())
+
+
+@pytest.mark.parametrize("record", [EngineState, *PARTS, Log])
 def test_arrays_are_allocated_as_declared(record):
     arrays = allocate(record, SIZES)
     for name, declared in declarations(record).items():
@@ -47,17 +52,17 @@ def test_arrays_are_allocated_as_declared(record):
 
 
 def test_every_array_is_declared_once():
-    for record in (Model, State, Work, Log):
+    for record in (Model, EngineState, *PARTS, Log):
         assert tuple(declarations(record)) == record._fields
 
 
 def test_saved_arrays_may_get_more_room():
-    before, larger = allocate(State, SIZES), Sizes.of(THREE, 40)
+    before, larger = allocate(EngineState, SIZES), Sizes.of(THREE, 40)
     rng = np.random.default_rng(0)
     for array in before:
         array[...] = rng.integers(1, 9, array.shape)
-    after = restored(State, larger, before._asdict())
-    for name, declared in declarations(State).items():
+    after = restored(EngineState, larger, before._asdict())
+    for name, declared in declarations(EngineState).items():
         old, new = getattr(before, name), getattr(after, name)
         assert new.shape == declared.extents(larger)
         np.testing.assert_array_equal(new[: len(old)], old)
@@ -67,7 +72,7 @@ def test_saved_arrays_may_get_more_room():
 def test_saved_arrays_of_other_bodies_are_refused():
     two = Sizes.of(DumbbellDrum(count=2).bodies, 16)
     with pytest.raises(ValueError, match="broadcast"):
-        restored(State, two, allocate(State, SIZES)._asdict())
+        restored(EngineState, two, allocate(EngineState, SIZES)._asdict())
 
 
 def test_constants_are_brought_to_their_type_and_shape():

@@ -1,6 +1,7 @@
 """Islands of thousands of bodies: a few sweeps, by any number of threads."""
 
 from functools import cache
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -11,12 +12,9 @@ from polycorner import Friction, Manifold, Polyhedron, System, velocities
 from polycorner.bodies import Arrangement, HalfSpace, Mass, disc, sphere
 from polycorner.motion import ContactFamily, Disc, pair_coordinates
 from polycorner.motion.checkpoints import Checkpoint
-from polycorner.motion.engine.arrays import CONTACTS, Work, declarations
-from polycorner.motion.engine.compact import TOLERATED
-from polycorner.motion.engine.crowds import CROWD
-from polycorner.motion.engine.ranks import PERIOD
-from polycorner.motion.engine.threads import OWN
-from polycorner.motion.noise import Solver
+from polycorner.motion.engine.arrays import CONTACTS, OWN, Work, declarations
+from polycorner.motion.engine.crowds import CROWD, PERIOD
+from polycorner.motion.noise import OPTIONS, Solver
 from polycorner.motion.simulation import simulate, start
 from tests.motion.engine.inclusion import residuals, response
 
@@ -47,9 +45,9 @@ def heap(friction=MU, rolling=0.0, **settings):
 
 def crowds(engine):
     """Return the blocks of every crowd of the last step."""
-    starts = engine.work.island_start
+    starts = engine.work.island.start
     roots = np.flatnonzero(np.diff(starts) > CROWD)
-    return [engine.work.order[starts[i] : starts[i + 1]] for i in roots]
+    return [engine.work.block.order[starts[i] : starts[i + 1]] for i in roots]
 
 
 def listed_pairs(engine):
@@ -65,11 +63,16 @@ def test_threads_share_no_array_in_which_something_is_in_the_making():
     Of the rows of bodies some hold the matrix of an island, and are a thread's own as well.
     """
     rows = {"N", "N+1", "B", "C", "P", "V"}
-    whole = {name for name, d in declarations(Work).items() if d.shape.split()[0] not in rows}
-    serial = {"list_status", "listed_travel", "near", "sort_keys", "strips", "strip_cursor"}
-    told = {"finite", "located", "remedy", "signals", "strip_start", "told", "told_times", "worst"}
-    assert whole - set(OWN) == serial | told
-    assert {"members", "number", "place", "row_start"} <= set(OWN)
+    whole = {
+        f"{part}.{name}"
+        for part, record in get_type_hints(Work).items()
+        for name, d in declarations(record).items()
+        if part not in OWN and d.shape.split()[0] not in rows
+    }
+    serial = {"neighbours.status", "neighbours.travel", "manner.near", "pair.sort_keys"}
+    serial |= {"crowd.strips", "crowd.strip_cursor", "crowd.strip_start"}
+    told = {f"shared.{name}" for name in ("finite", "signals", "told", "times", "worst")}
+    assert whole == serial | told | {"manner.located", "manner.remedy"}
 
 
 @pytest.mark.parametrize(("sweeps", "rolling"), [(0, 0.0), (6, 0.0), (6, 0.1)])
@@ -80,9 +83,9 @@ def test_any_number_of_threads_makes_the_same_motion(sweeps, rolling):
         engine.advance(steps)
     if sweeps:
         assert crowds(single)
-        assert single.work.strips[0] > 4
+        assert single.work.crowd.strips[0] > 4
     else:
-        assert (np.diff(single.work.island_start) > 0).sum() > 4
+        assert (np.diff(single.work.island.start) > 0).sum() > 4
     for name, array in single.save().items():
         np.testing.assert_array_equal(several.save()[name], array, err_msg=name)
 
@@ -147,8 +150,10 @@ def test_a_step_with_new_ranks_starts_from_the_impulses_of_the_step_before():
         renewed = (engine.motion.body_of_rank != ranks).any()
         assert renewed == (engine.steps == PERIOD + 1)
         work = engine.work
-        known = work.contact_before[: work.list_status[2]] >= 0
-        met = [(i, j) in pairs for i, j in work.contact[: work.list_status[2], :2].tolist()]
+        known = work.pair.before[: work.neighbours.status[2]] >= 0
+        met = [
+            (i, j) in pairs for i, j in work.pair.contact[: work.neighbours.status[2], :2].tolist()
+        ]
         np.testing.assert_array_equal(known, met)
     assert left[3] < 2.0 * max(left[:3] + left[4:])
 
@@ -164,15 +169,15 @@ def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told(fric
             continue
         (blocks,) = blocks
         found, v = residuals(work, blocks, friction)
-        bodies = np.unique(work.block_bodies[blocks])
+        bodies = np.unique(work.block.bodies[blocks])
         moved = bodies[(bodies >= 0) & ~engine.motion.rests[bodies].astype(bool)]
-        np.testing.assert_allclose(work.v_new[moved], v[moved], atol=1e-9 * abs(v).max())
-        normal, rubs = work.impulse[blocks, 0], work.pressing[blocks] >= 0
-        limit = friction * work.impulse[work.pressing[blocks[rubs]], 0]
+        np.testing.assert_allclose(work.velocity.new[moved], v[moved], atol=1e-9 * abs(v).max())
+        normal, rubs = work.block.impulse[blocks, 0], work.block.pressing[blocks] >= 0
+        limit = friction * work.block.impulse[work.block.pressing[blocks[rubs]], 0]
         assert (normal[~rubs] >= 0).all()
         assert (abs(normal[rubs]) <= limit * (1 + 1e-12)).all()
-        speed = abs(work.free[blocks] + work.offset[blocks])
-        speed[work.block_rows[blocks] < 2, 1] = 0.0
+        speed = abs(work.block.free[blocks] + work.block.offset[blocks])
+        speed[work.block.rows[blocks] < 2, 1] = 0.0
         assert engine.effort.residual == pytest.approx(found.max() / speed.max(), rel=1e-6)
         met += 1
     assert met > 20
@@ -196,18 +201,18 @@ def test_more_sweeps_come_nearer_to_the_solution():
 
 def swept_plainly(work, blocks, sweeps):
     """Return the impulses after Gauss-Seidel sweeps from none, each contact solved in its turn."""
-    v, p, K = work.v_free.copy(), np.zeros(len(blocks)), work.v_free.shape[1]
+    v, p, K = work.velocity.free.copy(), np.zeros(len(blocks)), work.velocity.free.shape[1]
     sides = [
         [
-            (i, work.jacobian[b, 0, side * K : side * K + K], response(work, b, side, i)[0])
-            for side, i in enumerate(work.block_bodies[b])
+            (i, work.block.jacobian[b, 0, side * K : side * K + K], response(work, b, side, i)[0])
+            for side, i in enumerate(work.block.bodies[b])
             if i >= 0
         ]
         for b in blocks
     ]
     for _ in range(sweeps):
         for k, b in enumerate(blocks):
-            u = work.offset[b, 0] + sum(row @ v[i] for i, row, _ in sides[k])
+            u = work.block.offset[b, 0] + sum(row @ v[i] for i, row, _ in sides[k])
             new = max(0.0, p[k] - u / sum(row @ answer for _, row, answer in sides[k]))
             for i, _, answer in sides[k]:
                 v[i] += (new - p[k]) * answer
@@ -217,12 +222,12 @@ def swept_plainly(work, blocks, sweeps):
 
 def dual_energy(work, blocks, impulse):
     """Return ``p' W p / 2 + p' c``, which the impulses of a frictionless step minimise."""
-    work.impulse[blocks, 0], K = impulse, work.v_free.shape[1]
+    work.block.impulse[blocks, 0], K = impulse, work.velocity.free.shape[1]
     v = residuals(work, blocks, 0.0)[1]
-    sides = work.jacobian[blocks, 0].reshape(len(blocks), 2, K)
-    rows = np.einsum("bsk,bsk->bs", sides, v[work.block_bodies[blocks]])
-    after = np.where(work.block_bodies[blocks] >= 0, rows, 0.0).sum(axis=1)
-    return impulse @ (0.5 * (after + work.free[blocks, 0]) + work.offset[blocks, 0])
+    sides = work.block.jacobian[blocks, 0].reshape(len(blocks), 2, K)
+    rows = np.einsum("bsk,bsk->bs", sides, v[work.block.bodies[blocks]])
+    after = np.where(work.block.bodies[blocks] >= 0, rows, 0.0).sum(axis=1)
+    return impulse @ (0.5 * (after + work.block.free[blocks, 0]) + work.block.offset[blocks, 0])
 
 
 def test_sweeps_come_nearer_to_the_solution_than_if_each_contact_were_solved():
@@ -237,8 +242,8 @@ def test_sweeps_come_nearer_to_the_solution_than_if_each_contact_were_solved():
         engine.load({name: array.copy() for name, array in saved.items()})
         engine.advance(1)
         (blocks,) = crowds(engine)
-        blocks = np.sort(blocks[engine.work.block_rows[blocks] == 0])
-        found.append(engine.work.impulse[blocks, 0].copy())
+        blocks = np.sort(blocks[engine.work.block.rows[blocks] == 0])
+        found.append(engine.work.block.impulse[blocks, 0].copy())
     few, least, plain = (
         dual_energy(engine.work, blocks, p)
         for p in (*found, swept_plainly(engine.work, blocks, 20))
@@ -254,7 +259,7 @@ def test_surroundings_that_are_far_press_on_no_body():
     for array in (motion.normal, motion.pressed, motion.friction, motion.sticks):
         array[:] = 1
     engine.advance(1)
-    apart = (engine.work.gap > 0.5).all(axis=1)
+    apart = (engine.work.mid.gap > 0.5).all(axis=1)
     assert 0.5 * SIDE**2 < apart.sum() < SIDE**2 - 10
     for array in (motion.normal, motion.pressed, motion.friction, motion.sticks):
         assert not array[apart].any()
@@ -276,7 +281,7 @@ def test_discs_that_overlap_are_moved_apart_and_keep_their_velocities():
     engine.advance(300)
     near = cKDTree(engine.motion.q[:, :2]).query_pairs(2.0, output_type="ndarray")
     apart = np.linalg.norm(np.diff(engine.motion.q[near, :2], axis=1)[:, 0], axis=1)
-    assert 2.0 - apart.min() < 1.1 * TOLERATED * engine.model.gap_unit
+    assert 2.0 - apart.min() < 1.1 * OPTIONS.crowd_overlap * engine.model.gap_unit
     np.testing.assert_array_equal(engine.motion.v, velocity)
 
 
@@ -305,23 +310,25 @@ def test_friction_of_two_rows_obeys_its_law_in_a_crowd():
     engine.advance(5)
     (blocks,) = crowds(engine)
     work, motion = engine.work, engine.motion
-    rubs = blocks[work.block_rows[blocks] == 2]
+    rubs = blocks[work.block.rows[blocks] == 2]
     assert len(rubs) == side**2
-    p, u = work.impulse[rubs], motion.v[work.block_bodies[rubs, 0]]
+    p, u = work.block.impulse[rubs], motion.v[work.block.bodies[rubs, 0]]
     nearest, limit = p - u, mu * weight * DT
     far = np.linalg.norm(nearest, axis=1, keepdims=True)
     nearest = np.where(far > limit, limit * nearest / far, nearest)
     assert (far > limit).any()
     assert abs(nearest - p).max() < 1e-3 * abs(pushed).max()
-    others = blocks[work.block_rows[blocks] == 0]
-    v = work.v_free.copy()
+    others = blocks[work.block.rows[blocks] == 0]
+    v = work.velocity.free.copy()
     for b in others:
-        for i, row in zip(work.block_bodies[b], work.jacobian[b, 0].reshape(2, -1), strict=True):
-            v[i] += work.impulse[b, 0] * row
-    v[work.block_bodies[rubs, 0], :2] += p
+        for i, row in zip(
+            work.block.bodies[b], work.block.jacobian[b, 0].reshape(2, -1), strict=True
+        ):
+            v[i] += work.block.impulse[b, 0] * row
+    v[work.block.bodies[rubs, 0], :2] += p
     moved = ~motion.rests.astype(bool)  # others have exactly the velocity of rest
     assert moved.sum() > 50
-    np.testing.assert_allclose(work.v_new[moved], v[moved], atol=1e-12)
+    np.testing.assert_allclose(work.velocity.new[moved], v[moved], atol=1e-12)
 
 
 def pile_in_space(body, **settings):
@@ -340,7 +347,7 @@ def test_balls_in_space_are_swept():
     assert crowds(engine)
     norms = np.linalg.norm(engine.motion.q[:, 3:], axis=1)
     np.testing.assert_allclose(norms, 1.0, atol=1e-4)
-    assert engine.motion.q[:, 2].min() > 1 - 5 * TOLERATED
+    assert engine.motion.q[:, 2].min() > 1 - 5 * OPTIONS.crowd_overlap
 
 
 def test_other_bodies_in_space_are_not_swept():

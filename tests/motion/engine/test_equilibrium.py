@@ -19,31 +19,33 @@ def rest_problem(engine, before, share):
     last step.
     """
     work, model = engine.work, engine.model
-    k, count = model.dimension, int(work.island_start[-1])
+    k, count = model.dimension, int(work.island.start[-1])
     p, rules = cp.Variable((count, 2)), []
-    sums = {i: work.mass[i, :, :k] @ (work.v_free[i, :k] - before[i]) for i in awake(engine)}
+    sums = {
+        i: work.mid.mass[i, :, :k] @ (work.velocity.free[i, :k] - before[i]) for i in awake(engine)
+    }
     for b in range(count):
-        rows, owner = max(1, work.block_rows[b]), work.pressing[b]
-        J = work.jacobian[b, :rows].reshape(rows, 2, -1)
-        bodies = [i for i in work.block_bodies[b] if i >= 0]
+        rows, owner = max(1, work.block.rows[b]), work.block.pressing[b]
+        J = work.block.jacobian[b, :rows].reshape(rows, 2, -1)
+        bodies = [i for i in work.block.bodies[b] if i >= 0]
         for side, i in enumerate(bodies):
             if i in sums:
                 sums[i] = sums[i] + J[:, side, :k].T @ p[b, :rows]
-        if work.block_rows[b] == 0:
+        if work.block.rows[b] == 0:
             ends = [J[0, side, :k] @ before[i] for side, i in enumerate(bodies)]
-            opens = sum(ends) + work.offset[b, 0] > 1e-2
+            opens = sum(ends) + work.block.offset[b, 0] > 1e-2
             rules.append(p[b, 0] == 0 if opens else p[b, 0] >= 0)
             continue
-        drum = work.origin[b, 0] == OWN_FRICTION
-        shape = (model.friction_sets if drum else model.pair_sets)[work.origin[b, 2], 0]
+        drum = work.block.origin[b, 0] == OWN_FRICTION
+        shape = (model.friction_sets if drum else model.pair_sets)[work.block.origin[b, 2], 0]
         mu = model.set_sizes[shape, 0 if model.set_kinds[shape] == DISC else 1]
-        load = (1 - share) * work.block_load[b] if drum else p[owner, 0]
+        load = (1 - share) * work.block.load[b] if drum else p[owner, 0]
         rules.append(cp.norm(p[b, :rows]) <= mu * load)
     return sums, rules
 
 
 def awake(engine):
-    return np.flatnonzero(engine.work.awake)
+    return np.flatnonzero(engine.work.body.awake)
 
 
 def spare(engine, before):
@@ -63,12 +65,12 @@ def least_motion(engine, before):
     work, model, most = engine.work, engine.model, cp.Variable()
     sums, rules = rest_problem(engine, before, 0.0)
     for i, total in sums.items():
-        velocity = work.inverse_mass[i, :, : model.dimension] @ total
+        velocity = work.mid.inverse_mass[i, :, : model.dimension] @ total
         rules.append(cp.norm_inf(cp.multiply(model.units, velocity)) <= most)
     cp.Problem(cp.Minimize(most), rules).solve(solver=cp.CLARABEL)
     speeds = [
-        abs(work.free[b, :rows] + work.offset[b, :rows]).max()
-        for b, rows in enumerate(np.maximum(1, work.block_rows[: int(work.island_start[-1])]))
+        abs(work.block.free[b, :rows] + work.block.offset[b, :rows]).max()
+        for b, rows in enumerate(np.maximum(1, work.block.rows[: int(work.island.start[-1])]))
     ]
     return most.value / max(speeds)
 
@@ -87,7 +89,7 @@ def test_a_pile_remains_at_rest_as_long_as_it_can():
     while engine.time < 30:
         before, rested = engine.motion.v.copy(), engine.motion.rests.all()
         engine.advance(1)
-        if rested and engine.work.awake.any():
+        if rested and engine.work.body.awake.any():
             found = left if engine.motion.rests.all() else slides
             found.append(spare(engine, before))
             if found[-1] < 0:  # no equilibrium, if the solver were exact

@@ -12,9 +12,9 @@ from tests.support.stages import callable_stage
 
 
 class Work(NamedTuple):
-    """The arrays that the order of elimination needs."""
+    """The arrays that the order of elimination needs, of whatever record."""
 
-    block_bodies: Any
+    bodies: Any
     order: Any
     awake: Any
     listed: Any
@@ -51,8 +51,8 @@ def ordered(pairs, n, room=None):
     """Return the workspace after the bodies were ordered, or None where there is no room."""
     work = workspace(pairs, n, n * n if room is None else room)
     blocks = len(work.order)
-    assert list_bodies(work, 0, blocks) == n
-    fits = find_neighbours(work, 0, blocks, n) and eliminate_all(work, n)
+    assert list_bodies(work, work, work, work, 0, blocks) == n
+    fits = find_neighbours(work, work, work, work, 0, blocks, n) and eliminate_all(work, work, n)
     return work if fits else None
 
 

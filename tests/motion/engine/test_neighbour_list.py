@@ -32,26 +32,26 @@ def test_neighbours_are_all_pairs_that_are_near_enough(count):
     for _ in range(40):
         engine.advance(1)
         work = engine.work
-        places = work.listed_position.copy()
+        places = work.neighbours.position.copy()
         if former is not None and (places == former).all():
             continue
         former, lists = places, lists + 1
-        reach, travel = engine.model.reach, work.listed_travel[0]
+        reach, travel = engine.model.reach, work.neighbours.travel[0]
         far = reach * (1 + SKIN) + max(0.0, 2 * travel - 0.25 * SKIN * reach)
         apart = np.linalg.norm(places[:, None] - places[None], axis=2)
         expected = np.argwhere(np.triu(apart < far, 1))
-        found = work.neighbours[: work.list_status[0]]
+        found = work.neighbours.pairs[: work.neighbours.status[0]]
         assert len(found) == len(expected) > count / 2
         ranks = np.sort(engine.motion.rank[found], axis=1) @ [count, 1]
         assert (np.diff(ranks) > 0).all()
         np.testing.assert_array_equal(found[np.lexsort(found.T[::-1])], expected)
     assert lists > 2
-    assert (work.column.max() > work.column.min() + 5) == (count >= MANY)
+    assert (work.neighbours.column.max() > work.neighbours.column.min() + 5) == (count >= MANY)
 
 
 def test_a_body_that_flew_far_away_has_no_neighbours():
     engine = flying(MANY, 75.0, 0)
     engine.motion.q[7, 0] = 1e200
     engine.advance(1)
-    assert not (engine.work.neighbours[: engine.work.list_status[0]] == 7).any()
-    assert engine.work.list_status[0] > MANY / 2
+    assert not (engine.work.neighbours.pairs[: engine.work.neighbours.status[0]] == 7).any()
+    assert engine.work.neighbours.status[0] > MANY / 2

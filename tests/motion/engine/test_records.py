@@ -13,11 +13,11 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import scatter
 from polycorner.motion import Noise
 from polycorner.formulas.shipped import Shipped
-from polycorner.motion.engine import records
+from polycorner.motion.engine import entry_point
 from polycorner.motion.simulation import start
 
 if sys.argv[1] != "0":
-    records.UNTOLD = int(sys.argv[1])
+    entry_point.UNTOLD = int(sys.argv[1])
     Shipped.text = ""
 drum = DumbbellDrum(count=20, floor=True)
 places = scatter(drum, np.random.default_rng(0), width=0.2, height=80.0, tries=1000)
