@@ -322,12 +322,11 @@ def _symmetric(claim: Claim, enclosure: Enclosure) -> ConditionResult:
             return undecided(
                 f"exact algebra does not show that {name} is constant along {field}",
             )
-    sections = []
-    for gauge in claim.system.gauges:
-        fields = [field.at(box.hull) for field in claim.fields]
-        sections.append([dot(gauge, f) if not isinstance(f, Undecided) else f for f in fields])
+    fields = [field.at(box.hull) for field in claim.fields]
+    known = [f for f in fields if not isinstance(f, Undecided)]
+    sections = [[dot(gauge, f) for f in known] for gauge in claim.system.gauges]
     listed = "; ".join(map(str, claim.fields))
-    if not any(isinstance(x, Undecided) for row in sections for x in row) and is_regular(sections):
+    if len(known) == len(fields) and is_regular(sections):
         reason = f"energy and active functions are constant along {listed}, across the section"
         return proved(reason)
     return undecided(f"{listed} may be tangent to the section chosen across it")

@@ -334,14 +334,9 @@ def prove(
 
 def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
     """Return the proof for the parameters of the problem."""
-    d = certificate.problem.polyhedron
-    active = _active_names(certificate, tried)
-    posed, enclosure = tried.posed, tried.enclosure
-    if isinstance(posed, Undecided):
-        return _proof(certificate, digits, active, (), tried.found)
-    symmetry, found = tuple(map(str, posed.claim.fields)), _refused(tried.found, posed)
-    if isinstance(enclosure, Undecided):
-        return _proof(certificate, digits, active, symmetry, found)
+    d, posed, enclosure = certificate.problem.polyhedron, tried.posed, tried.enclosure
+    if isinstance(posed, Undecided) or isinstance(enclosure, Undecided):
+        return _proof(certificate, tried, digits, tried.found)
     with precision(tried.bits):
         values = [bounds(x) for x in enclosure.solution]
         energy = bounds(enclosure.linear.energy)
@@ -351,7 +346,7 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
     sides = {name: side for name, side in sides.items() if name not in hidden}
     box = _named(posed, _uniqueness_box(enclosure))
     return replace(
-        _proof(certificate, digits, active, symmetry, found),
+        _proof(certificate, tried, digits, tried.found),
         enclosures={name: decimals(*side, digits) for name, side in sides.items()},
         box={
             name: decimals(*side, digits + BOX_DIGITS, inwards=True) for name, side in box.items()
@@ -376,27 +371,19 @@ def _named(posed: Posed, unknowns: list[Bounds]) -> dict[str, Bounds]:
     return dict(zip(names, unknowns, strict=False))
 
 
-def _active_names(certificate: Certificate, tried: Attempt) -> tuple[str, ...]:
-    names = certificate.problem.polyhedron.names
-    return tuple(names[i] for i in tried.face if i < len(names))
-
-
-def _refused(found: Mapping[str, ConditionResult], posed: Posed) -> dict[str, ConditionResult]:
-    """Add the result for a declared symmetry that does not hold, if there is one."""
-    return dict(found) | ({} if posed.refused is None else {SYMMETRIC: posed.refused})
-
-
 def _proof(
-    certificate: Certificate,
-    digits: int,
-    active: tuple[str, ...],
-    symmetry: tuple[str, ...],
-    found: Mapping[str, ConditionResult],
+    certificate: Certificate, tried: Attempt, digits: int, found: Mapping[str, ConditionResult]
 ) -> Proof:
+    """Return a proof without enclosures; a declared symmetry that does not hold is a condition."""
+    names, posed = certificate.problem.polyhedron.names, tried.posed
+    symmetry: tuple[str, ...] = ()
+    if not isinstance(posed, Undecided):
+        symmetry = tuple(map(str, posed.claim.fields))
+        found = dict(found) | ({} if posed.refused is None else {SYMMETRIC: posed.refused})
     return Proof(
         certificate,
         digits,
-        active,
+        tuple(names[i] for i in tried.face if i < len(names)),
         symmetry,
         conditions={name: finding.status for name, finding in found.items()},
         reasons={name: finding.reason for name, finding in found.items()},
@@ -413,21 +400,19 @@ def _many(
     digits: int,
 ) -> Proof:
     """Return the proof for a box of parameters."""
-    found, posed = summary(cells), tried.posed
-    symmetry: tuple[str, ...] = ()
-    if not isinstance(posed, Undecided):
-        found, symmetry = _refused(found, posed), tuple(map(str, posed.claim.fields))
-        if posed.refused and posed.refused.status is Status.FAILED:
-            # Seen at the certificate's parameters only.
-            found[SYMMETRIC] = replace(posed.refused, status=Status.PARTLY)
-    active = _active_names(certificate, tried)
+    posed = tried.posed
+    refused = None if isinstance(posed, Undecided) else posed.refused
+    if not isinstance(posed, Undecided) and refused and refused.status is Status.FAILED:
+        # It was seen to fail at the certificate's parameters only.
+        partly = replace(refused, status=Status.PARTLY)
+        tried = replace(tried, posed=replace(posed, refused=partly))
     proved = [cell.bounds for cell in cells if cell.status is Status.PROVED]
     hulls = {
         name: (Fraction(min(b[name][0] for b in proved)), Fraction(max(b[name][1] for b in proved)))
         for name in (proved[0] if proved else ())
     }
     return replace(
-        _proof(certificate, digits, active, symmetry, found),
+        _proof(certificate, tried, digits, summary(cells)),
         enclosures={
             name: decimals(*side, min(digits, DOUBLE_DIGITS)) for name, side in hulls.items()
         },

@@ -162,11 +162,13 @@ def newton(
             lam[going] = np.einsum("bik,bi->bk", np.linalg.pinv(slopes), pull)
         weights = lam[going]
         matrix = bordered(bent - np.einsum("bk,bkij->bij", weights, bends), slopes)
+        # A row that only fills up says that its multiplier does not change.
         matrix[:, unit, unit] = faces.filled[going]
         balance = pull - np.einsum("bk,bki->bi", weights, slopes)
         change = solved(matrix, -np.concatenate([balance, values], axis=1))
         length = abs(change[:, :n]).max(axis=1, initial=0.0)
         with np.errstate(divide="ignore"):
+            # Far from a solution a step may leave the place where formulas are defined.
             change *= np.minimum(1.0, STRIDE / length)[:, None]
         fine = np.isfinite(change).all(axis=1)
         going, change, length = going[fine], change[fine], length[fine]
@@ -357,6 +359,7 @@ class Attempts:
         if not parts:
             return
         since = np.concatenate([e.boxes.since[boxes] for e, boxes in chosen])
+        # Those that have waited longest; ties in the order of the boxes, whatever the threads did.
         order = np.argsort(-since, kind="stable")[:ATTEMPTS]
         tried = np.zeros(len(since), dtype=np.bool_)
         tried[order] = True
@@ -398,6 +401,7 @@ class Attempts:
         each = np.array_split(np.arange(len(q)), -(-len(q) // PART))
         points = np.concatenate(list(mapped(self._candidates, map(starts.part, each))))
         fine = np.flatnonzero(np.isfinite(points).all(axis=1))
+        # Points of one face are screened together, in the order in which they were found.
         kinds, which = np.unique(starts.active[fine], axis=0, return_inverse=True)
         order = np.argsort(which.ravel(), kind="stable")
         ends = np.searchsorted(which.ravel()[order], np.arange(1, len(kinds)))
@@ -405,22 +409,20 @@ class Attempts:
             self._show(points[here], tuple(np.flatnonzero(active).tolist()), starts.widest[here])
 
     def _find_loci(self, starts: Array) -> None:
-        setting, z = self.setting, self.setting.reads
+        setting, known, z = self.setting, self.setting.known, self.setting.reads
         if setting.equations or not len(starts):
             return
         inside = np.zeros((len(starts), setting.problem.inequalities), dtype=np.bool_)
         points, found = newton(setting.problem, starts, inside, z)
         for q in points[found]:
-            if self.setting.known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
+            if known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
                 continue
             place = locus(setting.faces.formulas, z, q, setting.problem.scales, setting.domain.held)
             if place is None:
                 self.failed.add(LOCUS, q, WIDEST)
-            elif not self.setting.known.has_locus(place):
+            elif not known.has_locus(place):
                 shown = met(place, setting.functions, setting.conj, setting.domain)
-                (self.setting.known.missed if shown is None else self.setting.known.loci).append(
-                    shown or place
-                )
+                (known.missed if shown is None else known.loci).append(shown or place)
 
     def _candidates(self, starts: Starts) -> Array:
         """Return KKT points near some points, ``(B, n)``, NaN where there is none."""
@@ -436,6 +438,7 @@ class Attempts:
         """Try regions about approximate KKT points of a face, each once."""
         fresh, grid = list[int](), set[bytes]()
         for i, (q, size) in enumerate(zip(points, widest.tolist(), strict=True)):
+            # Starts in neighbouring boxes lead to one point: it is tried once.
             place = np.rint(q / (DEFAULT.same / 10 * self.setting.problem.scales)).tobytes()
             if place not in grid and self._is_new(q, active, size):
                 grid.add(place)
@@ -446,6 +449,7 @@ class Attempts:
             guesses = Screen(self.setting, active, points).radii(widest)
         for i, (q, size) in enumerate(zip(points, widest.tolist(), strict=True)):
             guess = None if guesses is None else guesses[i]
+            # A region that was added in this loop may contain the point.
             if not self._is_new(q, active, size):
                 continue
             if guess is not None and np.isnan(guess).any():

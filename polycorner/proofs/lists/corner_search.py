@@ -6,6 +6,7 @@ bisected.  Corners become known by Newton's method where the gradients of enough
 independent on a box, and by the search for a singular one in small boxes where they are not.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations, islice
 
@@ -14,8 +15,8 @@ import numpy as np
 from polycorner.proofs.lists.attempts import WIDER, Mapped
 from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.contraction import narrowed
+from polycorner.proofs.lists.examination import without_images
 from polycorner.proofs.lists.faces import Region
-from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.levels import Enclosures, Levels, Places, Rows, Truths, levels
 from polycorner.proofs.lists.redundancy import STRAY
 from polycorner.proofs.lists.relations import Relation, relation
@@ -71,10 +72,7 @@ class CornerSearch(BoxSearch):
 
     def _examined(self, boxes: Boxes) -> Chunk:
         """Return what is shown of some boxes; nothing is changed."""
-        gone = np.zeros(len(boxes), dtype=np.bool_)
-        if self.motions:
-            gone = dropped(boxes.lower, boxes.upper, self.motions, self.weights, self.domain)
-        images, boxes = boxes.nodes[gone], boxes.part(~gone)
+        images, boxes = without_images(self, boxes)
         m, k = self.problem.inequalities, self.equations
         v_lo, v_hi, *gradients = self.functions.gradients(boxes.lower, boxes.upper, mean_value=True)
         meets: Mask = np.all((v_lo[:, m : m + k] <= 0) & (v_hi[:, m : m + k] >= 0), axis=1)
@@ -88,13 +86,15 @@ class CornerSearch(BoxSearch):
         part = boxes.part(at)
         sides = gradients[0][at], gradients[1][at]
         found = Enclosures.of(self.functions, part.lower, part.upper, sides, self.domain.free)
-        around = _Around(self.regions, part, self.domain.lower < self.domain.upper)
+        zero, critical = _around(self.regions, part, self.domain.lower < self.domain.upper)
         related = [frozenset(r.rows) for r in self.relations.values() if r]
-        result = levels(found, masks[at], k, around.zero, around.critical, related)
+        result = levels(found, masks[at], k, zero, critical, related)
         left = np.zeros(len(boxes), dtype=np.bool_)
         left[at[result.left]] = True
         regular = self._regular(found, result)
         rest = result.left.copy()
+        # Boxes with a regular candidate are left to Newton; where none is, the gradients of all
+        # sets may be dependent, and a singular corner is looked for once the boxes are small.
         for _, places in regular:
             rest[places] = False
         singular = [
@@ -128,6 +128,7 @@ class CornerSearch(BoxSearch):
             for box in at:
                 if tried < ATTEMPTS:
                     tried += self._vertex(boxes.middles[box], rows, sizes[box])
+        # Not again before each coordinate was bisected once.
         every = len(self.domain.free)
         ripe = [(box, rows) for box, rows in chunk.singular if boxes.since[box] >= every]
         for _, open_ in ripe[:RARE]:
@@ -176,35 +177,26 @@ class CornerSearch(BoxSearch):
         return q
 
 
-class _Around:
-    """Regions around boxes, with questions about sets of functions."""
+def _around(
+    regions: list[Region], boxes: Boxes, free: Truths
+) -> tuple[Callable[[Rows, Places], Truths], Callable[[Rows, Places], Truths]]:
+    """Return two questions about sets of functions in some boxes, answered by regions around them.
 
-    def __init__(self, regions: list[Region], boxes: Boxes, free: Truths) -> None:
-        self.zeros: dict[Rows, Truths] = {}
-        self.criticals: dict[Rows, Truths] = {}
-        for region in regions:
-            within: Truths = (region.lower < boxes.lower) & (boxes.upper < region.upper)
-            inside: Truths = np.all(within | ~free, axis=1)
-            if inside.any():
-                self._add(self.zeros, tuple(sorted(region.active)), inside)
-                for i in region.critical if isinstance(region, TipRegion) else ():
-                    self._add(self.criticals, (i,), inside)
+    Whether their common zero, with the equations, is known; and whether the point where the
+    gradient of a single function vanishes is.
+    """
+    zeros, criticals = dict[Rows, Truths](), dict[Rows, Truths]()
+    for region in regions:
+        within: Truths = (region.lower < boxes.lower) & (boxes.upper < region.upper)
+        inside: Truths = np.all(within | ~free, axis=1)
+        at = [(zeros, tuple(sorted(region.active)))]
+        if isinstance(region, TipRegion):
+            at += [(criticals, (i,)) for i in region.critical]
+        for known, rows in at:
+            known[rows] = known.get(rows, np.zeros_like(inside)) | inside
 
-    @staticmethod
-    def _add(known: dict[Rows, Truths], rows: Rows, inside: Truths) -> None:
-        inside = inside.copy()
-        inside |= known.get(rows, inside)
-        known[rows] = inside
+    def asked(known: dict[Rows, Truths]) -> Callable[[Rows, Places], Truths]:
+        nothing = np.zeros(len(boxes), dtype=np.bool_)
+        return lambda rows, at: known.get(rows, nothing)[at]
 
-    def zero(self, rows: Rows, at: Places) -> Truths:
-        """Whether the common zero of functions, and the equations, is known in some boxes."""
-        return self._found(self.zeros, rows, at)
-
-    def critical(self, rows: Rows, at: Places) -> Truths:
-        """Whether the point where the gradient of a function vanishes is known in some boxes."""
-        return self._found(self.criticals, rows, at)
-
-    @staticmethod
-    def _found(known: dict[Rows, Truths], rows: Rows, at: Places) -> Truths:
-        found = known.get(rows)
-        return np.zeros(len(at), dtype=np.bool_) if found is None else found[at]
+    return asked(zeros), asked(criticals)

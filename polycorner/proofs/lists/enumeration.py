@@ -295,6 +295,7 @@ def stationary_points(
         for k, part in enumerate(branches.parts):
             search = question.begun(StationarySearch, part, minima_only=minima_only)
             searches.append(search)
+            # Each piece is a search of its own, with a store of its own.
             folder = store if store is None or not several else Path(store) / f"piece_{k}"
             kept = None if folder is None else SearchStore(folder, search)
             try:

@@ -86,12 +86,17 @@ class Examined:
         return np.flatnonzero(~self.done[self.rest.items])
 
 
+def without_images(setting: Setting, boxes: Boxes) -> tuple[NDArray[np.int64], Boxes]:
+    """Return the nodes of boxes that a symmetry carries to others, and the other boxes."""
+    if not setting.motions:
+        return boxes.nodes[:0], boxes
+    gone = dropped(boxes.lower, boxes.upper, setting.motions, setting.weights, setting.domain)
+    return boxes.nodes[gone], boxes.part(~gone)
+
+
 def examine(setting: Setting, sharp: bool, boxes: Boxes) -> Examined:
     """Close what can be closed in some boxes; ``sharp``: by second derivatives, too."""
-    gone = np.zeros(len(boxes), dtype=np.bool_)
-    if setting.motions:
-        gone = dropped(boxes.lower, boxes.upper, setting.motions, setting.weights, setting.domain)
-    images, boxes = boxes.nodes[gone], boxes.part(~gone)
+    images, boxes = without_images(setting, boxes)
     problem, k = setting.problem, setting.equations
     m = problem.inequalities
     v_lo, v_hi, g_lo, g_hi = setting.functions.gradients(boxes.lower, boxes.upper, monotone=True)
@@ -112,11 +117,13 @@ def examine(setting: Setting, sharp: bool, boxes: Boxes) -> Examined:
     continuous = setting.functions.continuous(boxes.lower, boxes.upper)
     smooth: Mask = np.all(continuous[where, :m] | ~masks, axis=1)
     smooth &= np.all(continuous[where, m:], axis=1)
+    # A direction shows nothing where a function may jump, or have no bounded slope.
     found &= smooth
     rest = np.flatnonzero(~found)
     with np.errstate(all="ignore"):
         steep = 0.5 * (g_lo[where[rest]] + g_hi[where[rest]]) * problem.scales
         pulls = np.linalg.norm(steep[:, [*range(m), -1]], axis=2)
+    # Gradients of the items are kept for loci alone; elsewhere they would fill the memory.
     some = where[rest] if setting.may_have_loci else where[:0]
     kept = Rest(rest, weights[rest], pulls, smooth[rest], g_lo[some], g_hi[some])
     inner = np.stack([boxes.lower, boxes.upper])
@@ -148,6 +155,7 @@ def reconsider(setting: Setting, examined: Examined, regions: int = 0, loci: int
         examined.done[at[inside]] = True
     z = list(setting.reads)
     units = setting.domain.units.copy()
+    # A direction into the set along the other coordinates: the energy does not change with these.
     units[z] = 0.0
     for place in known.loci[loci:]:
         near = np.all(boxes.lower[:, z] > place.lower, axis=1)

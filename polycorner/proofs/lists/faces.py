@@ -126,6 +126,7 @@ class EnclosedFaces:
         """
         rows = (*self.rows(active), len(self.formulas.names) - 1)
         with precision(BITS):
+            # Balls are wider than the bounds that the guess was made with: shares of it are tried.
             for reach in [share * guess for share in GUESSED] if guess is not None else ():
                 shown = self._shown(*self._sides(q, reach), rows, len(active))
                 if isinstance(shown, Region):
@@ -161,6 +162,7 @@ class EnclosedFaces:
             return None
         unknowns = [box.hull[i] for i in self.free]
         found = self._image(forms, box, unknowns, kkt=False)
+        # Strictly, so that a neighbourhood of the box has one zero, too, and its sides none.
         if found is None or not strictly_inside(found[0], unknowns):
             return None
         for _ in range(SHARPENINGS):
@@ -276,6 +278,7 @@ class EnclosedFaces:
         small = self._small(forms, box, unknowns)
         shown = small and self._image(forms, box, small)
         if small and shown and strictly_inside(shown[0], small):
+            # The small box has a solution, and lies in one where there is only one: it is that.
             image = shown[0] if strictly_inside(small, unknowns) else image
         for _ in range(SHARPENINGS):
             pairs = zip(image, unknowns, strict=True)
@@ -310,6 +313,7 @@ class EnclosedFaces:
         positive eigenvalue ([NW] thm 16.3).
         """
         n = len(self.free)
+        # With its lower rows negated the Jacobian is symmetric.
         symmetric = [[(x if i < n else -x) for x in row] for i, row in enumerate(jacobian)]
         signs = inertia(symmetric)
         return None if signs is None else signs[0] - rows

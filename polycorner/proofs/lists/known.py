@@ -117,6 +117,7 @@ class Known:
         self._sides.add(frozenset(region.active), region.lower, region.upper)
         row = np.zeros(self._all.width)
         sides = np.array([region.lower, region.upper])
+        # All boxes have the same sides in parameters, so that these do not tell regions apart.
         sides[:, self._parameters] = 0.0  # of no account
         row[: 2 * self._dimension] = sides.ravel()
         row[[2 * self._dimension + i for i in region.active]] = 1.0

@@ -1,8 +1,9 @@
-"""Whether functions can vanish together in boxes, and whether their gradients are independent.
+"""Boxes in which no point is a corner but the known ones, by the sets that may vanish there.
 
-Both are shown for many boxes at a time, in double precision with bounds of all rounding errors: a
-sum of ``n`` products is off by at most ``(n + 2) 2^-52`` times the sum of their magnitudes,
-underflow excluded, which a summand of ``2^-1000`` covers ([Higham] sec. 3.1).
+Whether functions can vanish together, and whether their gradients are independent, is shown for
+many boxes at a time, in double precision with bounds of all rounding errors: a sum of ``n``
+products is off by at most ``(n + 2) 2^-52`` times the sum of their magnitudes, underflow excluded,
+which a summand of ``2^-1000`` covers ([Higham] sec. 3.1).
 
 Let ``[G]`` enclose the gradients of ``r`` functions on a box ``X`` with the middle ``c``, and
 ``Y`` be near a right inverse of its middle.
@@ -15,8 +16,6 @@ Let ``[G]`` enclose the gradients of ``r`` functions on a box ``X`` with the mid
   functions do not vanish together in ``X``, by the mean value theorem.  Combinations that nearly
   cancel all but one direction, and those with which a gradient is nearly orthogonal to the others,
   are tried.
-
-Boxes in which no point is a corner but the known ones, by the sets that may vanish there.
 
 Let ``U`` be the inequalities that may vanish in a box ``X`` and matter for the set there, ``h`` the
 ``k`` equations and ``N`` the number of coordinates.  A corner ``q`` in ``X`` is isolated among the
@@ -56,7 +55,7 @@ Truths = NDArray[np.bool_]
 Places = NDArray[np.intp]
 MOST_SETS = 2000  # of one size that are looked at in a batch of boxes
 Rows = tuple[int, ...]
-Known = Callable[[Rows, Places], Truths]
+Question = Callable[[Rows, Places], Truths]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,8 +185,8 @@ def levels(
     found: Enclosures,
     masks: Mask,
     equations: int,
-    known: Known,
-    except_at_known: Known,
+    known: Question,
+    except_at_known: Question,
     related: Sequence[frozenset[int]] = (),
 ) -> Levels:
     """Return the boxes in which there may be corners that are not known.
@@ -229,7 +228,9 @@ def levels(
                 left[at] = ~(found.independent(at, every) | except_at_known(rows, at))
             survivors[rows] = np.zeros(count, dtype=np.bool_)
             survivors[rows][at] = True
+        # A set has to be looked at if all its subsets may vanish: of the others 4 or 5 is true.
         alive = dict(_larger(survivors, masks & ~left[:, None]))
+        # Too many sets for a batch: what they may vanish in is left, and bisected.
         if len(alive) > MOST_SETS:
             for where in alive.values():
                 left |= where

@@ -1,10 +1,9 @@
 """Lists made of searches that have ended: points, loci and undecided boxes.
 
-Lists of a set that is a union of pieces with equations of their own, from the lists of these.
-
-The tangent cone of a finite union of closed sets is the union of their tangent cones.  A point is
-therefore stationary in the union, or a strict local minimum of it, if and only if it is in each
-piece that contains it.
+A set that is a union of pieces with equations of their own has a list made of what the searches in
+these found.  The tangent cone of a finite union of closed sets is the union of their tangent cones.
+A point is therefore stationary in the union, or a strict local minimum of it, if and only if it is
+in each piece that contains it.
 
 Let ``p`` be the point of a region of one piece.  It solves the KKT equations of all functions of
 its face, equations included, whatever the signs of multipliers; so it is the point of a region of
@@ -62,6 +61,7 @@ def listed(search: BoxSearch, problem: Problem) -> StationaryList:
             continue
         points.append(point_of(search, member, orbits))
         for image in images(search, member):
+            # An image that is not decided to be another point is told as one that may be.
             alike = known.has(image)
             if not alike:
                 known.add(image)

@@ -92,6 +92,7 @@ def locus(
         for power in range(QUARTERINGS):
             shown = _shown(formulas, z, q, units * WIDEST / 4**power, held)
             if shown is not None:
+                # The wide box closes other boxes, the sharp one is told.
                 sharp = _shown(formulas, z, q, units * SHARP, held)
                 return replace(
                     shown,

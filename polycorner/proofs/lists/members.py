@@ -83,6 +83,7 @@ class Listed:
         """Whether the point of a region is that of a known one; None where it is not decided."""
         if self.holds(member.region):
             return True
+        # Two plain members are one point only if their functions are the same, which was asked.
         others = self.special if member.is_plain else self.every
         found = [same(self.search, member, other, self.top) for other in others]
         return True if True in found else None if None in found else False
@@ -137,6 +138,7 @@ def settled(search: BoxSearch) -> tuple[list[tuple[int, Member]], dict[int, Arra
             seen.add(member)
             members.append((k, member))
     known, found = Listed(search), list[tuple[int, Member]]()
+    # A point may be that of several regions: the one that decides most is listed.
     for k, member in sorted(members, key=_order):
         before = known.has(member)
         if not before:
@@ -195,6 +197,7 @@ def judged(search: BoxSearch, region: Region) -> Member:
     held[list(region.active)] = True
     zeros = held.copy()
     outside = search.domain.misses(lower, upper, range(len(lower)))
+    # Exact algebra is slow: only for points in the domain with signs that are open.
     if not outside and (~below & ~above & ~held).any():
         found = signs(search.faces, placed(search, region), m)
         zeros |= np.array([sign == ZERO for sign in found])

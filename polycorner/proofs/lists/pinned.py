@@ -154,6 +154,7 @@ def _within(
                 ends = np.array([outward(x) for x in (*(point[i] for i in free), *whole)])
                 sides = lower, upper, zeros, ends[:, 0], ends[:, 1], 0
                 return Pinned(*sides, corner, into, steps, weights)
+        # Bends shrink with the square of the reach: the share tells about where a box would do.
         radii *= max(LEAST_SHARE, min(MOST_SHARE, SHARE * share)) if share else LEAST_SHARE
     return None
 
@@ -164,6 +165,7 @@ def _guessed(slopes: Array, scales: Array) -> tuple[Array, Array] | None:
 
     g, pull = slopes[:-1] * scales, slopes[-1] * scales
     (count, n), sizes = g.shape, np.linalg.norm(g, axis=1)
+    # No weight of 0: the exact correction that follows may make it negative.
     least = LEAST * np.linalg.norm(pull) / sizes.max()
     steps, weights = np.zeros(2 * n), np.zeros((2 * n, count))
     for k in range(2 * n):

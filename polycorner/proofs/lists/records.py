@@ -157,9 +157,9 @@ def save(path: str | os.PathLike[str], record: Record) -> Path:
 def described(record: Record) -> dict[str, Any]:
     """Return a problem, its regions, loci and symmetries, and the list, as plain data."""
     corners = record.active is not None
-    told = [list(a) for a in record.active or ()] or [
-        record.regions[k].index for k in record.listed
-    ]
+    told: list[Any] = [record.regions[k].index for k in record.listed]
+    if record.active is not None:
+        told = [list(active) for active in record.active]
     what = "active" if corners else "index"
     relations = [
         {"rows": list(r.rows), "weights": [str(w) for w in r.weights]} for r in record.relations
@@ -250,7 +250,7 @@ def _sides(box: Region | LocusRegion) -> dict[str, list[str]]:
 
 def region_data(region: Region) -> dict[str, Any]:
     """Return a region as plain data."""
-    found = {"active": list(region.active), "index": region.index, **_sides(region)}
+    found: dict[str, Any] = {"active": list(region.active), "index": region.index, **_sides(region)}
     if isinstance(region, Pinned):
         found["corner"] = list(region.corner)
         found |= {name: _hex(getattr(region, name).ravel()) for name in PINNED}

@@ -85,6 +85,7 @@ def _candidates(setting: Setting, e: Examined) -> Iterator[int]:
     if not left.size:
         return
     items = e.rest.items[left]
+    # Items without functions: the question is whether a region is around the box, of any face.
     anything = np.zeros((len(left), e.masks.shape[1]), dtype=np.bool_)
     chosen = covered(
         (e.boxes.lower, e.boxes.upper), e.where[items], anything, *setting.known.sides()
@@ -159,6 +160,7 @@ def pin(setting: Setting, e: Examined, attempts: Attempts) -> None:
     q = boxes.middles
     for _ in range(NEWTON):
         values, slopes = _vanishing(setting, q, masks)
+        # More functions than coordinates: the shortest step that fits them best.
         step = np.clip(np.einsum("bij,bj->bi", np.linalg.pinv(slopes), -values), -1, 1)
         q[:, free] += step * units[free]
     values, slopes = _vanishing(setting, q, masks)
@@ -172,6 +174,7 @@ def pin(setting: Setting, e: Examined, attempts: Attempts) -> None:
         ):
             continue
         region = pinned(setting.faces, q[i], slopes[i], reach)
+        # A point at which some of them do not vanish does not close the box.
         if region is None or not set(rows) <= set(region.active):
             attempts.failed.add((PINS, *rows), q[i], reach)
         else:

@@ -1,13 +1,13 @@
-"""Linear relations between functions: planes through a line, circles of a pencil, opposite signs.
+"""Linear relations between functions, and functions that are multiples of each other.
 
-Where ``sum c_i f_i + sum d_j h_j = 0`` everywhere and ``c_i`` is not 0, ``f_i`` vanishes wherever
-the other functions and the equations do: it takes no part in isolating a point.
+Planes through a line are related, and circles of a pencil.  Where ``sum c_i f_i + sum d_j h_j = 0``
+everywhere and ``c_i`` is not 0, ``f_i`` vanishes wherever the other functions and the equations do:
+it takes no part in isolating a point.
 
-Inequalities that say the same, or together say that a function vanishes.
-
-Of positive multiples of each other one is kept; a multiple of an equation holds wherever that does;
-and ``f >= 0`` with ``-f >= 0`` in one branch is the equation ``f = 0``.  Where such functions
-vanish their gradients are dependent, on whole faces.
+Multiples say the same, or together that a function vanishes.  Of positive multiples of each other
+one is kept; a multiple of an equation holds wherever that does; and ``f >= 0`` with ``-f >= 0`` in
+one branch is the equation ``f = 0``.  Where such functions vanish their gradients are dependent, on
+whole faces.
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,6 +68,7 @@ def relation(problem: Problem, rows: Sequence[int]) -> Relation | None:
     sizes, vectors = np.linalg.svd(values)[1:]
     if not sizes[-1] <= DEFAULT.alike / 10 * sizes[0]:
         return None
+    # The largest weight becomes 1, so that the others are likely to be small fractions.
     guess = vectors[-1] / vectors[-1][abs(vectors[-1]).argmax()]
     weights = [Fraction(x).limit_denominator(MOST_DENOMINATOR) for x in guess.tolist()]
     held = tuple([i for i, w in zip(rows, weights, strict=False) if w])

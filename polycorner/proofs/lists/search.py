@@ -1,4 +1,4 @@
-"""Branch and bound for all stationary points of an energy on a polyhedron.
+"""Branch and bound over boxes, and the search for all stationary points of an energy.
 
 A box is discarded where no point of the set lies in it, or where each of its branches has a
 direction along which the energy decreases (:mod:`~polycorner.proofs.lists.directions`), or lies in
@@ -19,7 +19,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from functools import partial
 
 import numpy as np
@@ -58,14 +58,7 @@ class Tally:
     @property
     def boxes(self) -> int:
         """All boxes that were treated."""
-        return (
-            self.outside
-            + self.descending
-            + self.covered
-            + self.images
-            + self.split
-            + self.undecided
-        )
+        return sum(astuple(self))
 
 
 @dataclass
@@ -172,6 +165,8 @@ class BoxSearch(Setting, ABC):
         largest = max(LEAST, min(CHUNK, NUMBERS // numbers))
         count = min(len(self.waiting), CHUNKS * largest)
         size = min(largest, max(LEAST, -(-count // CHUNKS)))
+        # The last boxes first, as in a search by depth: few boxes wait then, and what is found in
+        # one of them closes its neighbours.
         last = self.waiting.part(slice(len(self.waiting) - count, None))
         return [last.part(slice(i, i + size)) for i in range(0, count, size)]
 
@@ -210,6 +205,7 @@ class BoxSearch(Setting, ABC):
             boxes, inner = boxes.part(~small), inner[:, ~small]
         boxes = self._cut(boxes, inner)
         self.tally.split += len(boxes)
+        # Sides in scale units: a coordinate that is measured in small units is not preferred.
         axis = self._relative(boxes).argmax(axis=1)
         each = np.arange(len(boxes))
         middle = boxes.middles[each, axis]
@@ -232,6 +228,7 @@ class BoxSearch(Setting, ABC):
             for side, (ends, others) in enumerate(((lower, upper), (upper, lower))):
                 place = inner[side][:, axis]
                 share = (place - ends[:, axis]) / (others[:, axis] - ends[:, axis])
+                # A cut is a split whose outer part is closed at once: the checker sees splits only.
                 at = np.flatnonzero((share > LEAST_CUT) & (share < 1))
                 first = self.tree.split(nodes[at], np.full(len(at), axis), place[at])
                 self.tree.close(first + side, *nothing)
@@ -253,9 +250,12 @@ class StationarySearch(BoxSearch):
     def treat(self, chunks: list[Boxes], mapped: Mapped) -> list[Treated]:
         """Examine boxes, then try candidates near what is left."""
         late = self.tally.boxes >= SHARP or self.tally.undecided > 0
+        # Second derivatives are dear: most boxes of easy problems are closed without them.
         self.sharp = late or any(self._small(boxes).any() for boxes in chunks)
         self.attempts.sharp = self.sharp
         found = list(mapped(partial(examine, self, self.sharp), chunks))
+        # Boxes of this round may lie in regions that it finds itself: they are looked at again, at
+        # those regions only.
         regions, loci = len(self.regions), len(self.loci)
         self.attempts.at(found, mapped)
         if len(self.regions) > regions or len(self.loci) > loci:

@@ -224,10 +224,12 @@ class SearchStore:
                 records = search.tree.records(self._marks)
                 files |= self._written(f"tree-{self._count}.npz", records)
             files |= self._written(f"boxes-{self._count}.npz", waiting)
+            # The root is written last: until then the files of the time before count.
             content = self._stated | _progress(search) | {"files": files}
             text = json.dumps(content)
             root = json.dumps({"sha256": _digest(text.encode()), "search": text})
             write_atomically(self.path / ROOT, root)
+            # Only now: an interruption before leaves the search of the time before whole.
             for name in before - set(files):
                 (self.path / name).unlink(missing_ok=True)
         self._files, self._marks, self._count = files, search.tree.marks, self._count + 1

@@ -93,6 +93,7 @@ def _tips_at(faces: EnclosedFaces, point: Exact, open_: Sequence[int]) -> Iterat
     if active is None:
         return
     rest = range(len(active), len(active) + faces.equations)
+    # Each set is a region of its own: a box needs those that may vanish in it.
     for size in range(len(faces.free) - faces.equations + 1):
         for places in combinations(range(len(active)), size):
             chosen = [slopes[i] for i in (*places, *rest)]
@@ -214,6 +215,7 @@ def _relations(basis: list[Exact]) -> list[Exact]:
     """Return combinations of relations that may be definite: each, and sums of two."""
     every = list(basis)
     for u, v in pairwise(basis):
+        # Where no relation is definite by itself, a sum or a difference may be.
         every += [tuple(a + s * b for a, b in zip(u, v, strict=True)) for s in (1, -1)]
     return [tuple(s * x for x in relation) for relation in every for s in (1, -1)]
 

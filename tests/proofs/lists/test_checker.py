@@ -2,6 +2,7 @@
 
 import ast
 import json
+import operator
 import shutil
 import subprocess
 import sys
@@ -199,70 +200,6 @@ class File:
 NAMES = ("tree", "positions", "counts", "directions")
 
 
-def turned_direction(f):
-    f.directions[np.cumsum(f.counts)[np.argmax(f.counts == 1)] - 1] *= -1
-
-
-def no_direction(f):
-    f.directions[:] = 0
-
-
-def directions_not_finite(f):
-    f.directions[:] = np.nan
-
-
-def lost_direction(f):
-    f.directions = f.directions[:-1]
-
-
-def uncounted_direction(f):
-    f.counts[np.argmax(f.counts > 0)] -= 1
-
-
-def leaf_left_open(f):
-    f.codes[np.argmax(f.codes == -1)] = -2
-
-
-def leaf_split(f):
-    f.codes[np.argmax(f.codes == -1)] = 0
-
-
-def split_closed(f):
-    f.codes[0] = -1
-
-
-def unknown_code(f):
-    f.codes[np.argmax(f.codes == -1)] = -3
-
-
-def axis_that_is_none(f):
-    f.codes[0] = 5
-
-
-def more_nodes(f):
-    f.codes = np.append(f.codes, np.int8(-1))
-
-
-def fewer_nodes(f):
-    f.codes = f.codes[:-1]
-
-
-def split_outside(f):
-    f.positions[-1] = 1e3
-
-
-def split_nowhere(f):
-    f.positions[0] = np.nan
-
-
-def splits_elsewhere(f):
-    f.positions[0] = 0.99 * float.fromhex(f.data["domain"]["upper"][int(f.codes[0])])
-
-
-def wide_region(f):
-    f.data["regions"][0].update(f.data["domain"])
-
-
 def narrow_region(f):
     region = f.data["regions"][0]
     ends = zip(region["lower"], region["upper"], strict=True)
@@ -271,44 +208,16 @@ def narrow_region(f):
     ]
 
 
-def region_without_sides(f):
-    f.data["regions"][0]["lower"] = [(-np.inf).hex()] * len(f.data["coordinates"])
-
-
 def solution_elsewhere(f):
     region = f.data["regions"][0]
     for side in ("sharp_lower", "sharp_upper"):
         region[side][0] = (float.fromhex(region[side][0]) + 1e-9).hex()
 
 
-def other_index(f):
-    f.data["regions"][0]["index"] += 1
-
-
-def other_index_in_list(f):
-    f.data["points"][0]["index"] += 1
-
-
-def other_active_set(f):
-    f.data["regions"][0]["active"] = [] if f.data["regions"][0]["active"] else [0]
-
-
-def point_not_listed(f):
-    f.data["points"].pop()
-
-
 def point_and_region_lost(f):
     last = f.data["points"].pop()["region"]
     assert last == len(f.data["regions"]) - 1
     f.data["regions"].pop()
-
-
-def point_listed_twice(f):
-    f.data["points"].append(f.data["points"][0])
-
-
-def point_out_of_nothing(f):
-    f.data["points"].append({"region": len(f.data["regions"]), "index": 0})
 
 
 def region_repeated(f):
@@ -326,59 +235,94 @@ def other_operation(f):
     node[0] = "sub" if node[0] == "add" else "add"
 
 
-def unknown_operation(f):
-    next(n for n in f.data["nodes"] if n[0] == "add")[0] = "plus"
+def sign_of_symmetry(f):
+    f.data["symmetries"][0]["order"] = [0, 1]
+    f.data["symmetries"][0]["signs"] = [1, 1]
+    f.data["symmetries"][0]["shifts"] = ["0", "1/3"]
 
 
-def operation_on_itself(f):
-    f.data["nodes"][-1][1] = len(f.data["nodes"]) - 1
+def leaf(f):
+    """Return the place of the first closed box."""
+    return np.argmax(f.codes == -1)
 
 
-def functions_exchanged(f):
-    f.data["outputs"].reverse()
+def open_a_leaf(f, code=-2):
+    f.codes[leaf(f)] = code
 
 
-def empty_set(f):
-    f.data["branches"] = []
+def put(value, *path):
+    """Return a change that gives an entry of the data another value."""
+
+    def corrupt(f):
+        place = f.data
+        for key in path[:-1]:
+            place = place[key]
+        place[path[-1]] = value
+
+    return corrupt
 
 
-def whole_space(f):
-    f.data["branches"] = [[]]
+def add_one(f, records, name):
+    """Add 1 to an entry of the first of some records."""
+    f.data[records][0][name] += 1
 
 
-def set_without_a_branch(f):
-    f.data["branches"].pop()
+EVERYWHERE = {
+    "turned_direction": lambda f: np.negative(
+        row := f.directions[np.cumsum(f.counts)[np.argmax(f.counts == 1)] - 1], out=row
+    ),
+    "no_direction": lambda f: f.directions.fill(0),
+    "directions_not_finite": lambda f: f.directions.fill(np.nan),
+    "lost_direction": lambda f: setattr(f, "directions", f.directions[:-1]),
+    "uncounted_direction": lambda f: np.subtract.at(f.counts, np.argmax(f.counts > 0), 1),
+    "leaf_left_open": open_a_leaf,
+    "leaf_split": lambda f: open_a_leaf(f, 0),
+    "split_closed": lambda f: np.put(f.codes, 0, -1),
+    "unknown_code": lambda f: open_a_leaf(f, -3),
+    "axis_that_is_none": lambda f: np.put(f.codes, 0, 5),
+    "more_nodes": lambda f: setattr(f, "codes", np.append(f.codes, np.int8(-1))),
+    "fewer_nodes": lambda f: setattr(f, "codes", f.codes[:-1]),
+    "split_outside": lambda f: np.put(f.positions, -1, 1e3),
+    "split_nowhere": lambda f: np.put(f.positions, 0, np.nan),
+    "splits_elsewhere": lambda f: np.put(
+        f.positions, 0, 0.99 * float.fromhex(f.data["domain"]["upper"][int(f.codes[0])])
+    ),
+    "wide_region": lambda f: f.data["regions"][0].update(f.data["domain"]),
+    "narrow_region": narrow_region,
+    "region_without_sides": lambda f: f.data["regions"][0].update(
+        lower=[(-np.inf).hex()] * len(f.data["coordinates"])
+    ),
+    "solution_elsewhere": solution_elsewhere,
+    "other_index": lambda f: add_one(f, "regions", "index"),
+    "other_index_in_list": lambda f: add_one(f, "points", "index"),
+    "other_active_set": lambda f: f.data["regions"][0].update(
+        active=[] if f.data["regions"][0]["active"] else [0]
+    ),
+    "point_not_listed": lambda f: f.data["points"].pop(),
+    "point_and_region_lost": point_and_region_lost,
+    "point_listed_twice": lambda f: f.data["points"].append(f.data["points"][0]),
+    "point_out_of_nothing": lambda f: f.data["points"].append(
+        {"region": len(f.data["regions"]), "index": 0}
+    ),
+    "region_repeated": region_repeated,
+    "other_operation": other_operation,
+    "unknown_operation": lambda f: operator.setitem(
+        next(n for n in f.data["nodes"] if n[0] == "add"), 0, "plus"
+    ),
+    "operation_on_itself": lambda f: operator.setitem(
+        f.data["nodes"][-1], 1, len(f.data["nodes"]) - 1
+    ),
+    "functions_exchanged": lambda f: f.data["outputs"].reverse(),
+    "empty_set": put([], "branches"),
+    "whole_space": put([[]], "branches"),
+    "unknown_function": lambda f: f.data["branches"][0].append(17),
+    "open_boxes_not_counted": lambda f: (open_a_leaf(f), setattr(f, "counts", f.counts[1:])),
+    "other_format": put(0, "format", 1),
+    "part_missing": lambda f: f.data.pop("regions"),
+}
 
 
-def unknown_function(f):
-    f.data["branches"][0].append(17)
-
-
-def open_boxes_not_counted(f):
-    f.codes[np.argmax(f.codes == -1)] = -2
-    f.counts = f.counts[1:]
-
-
-def other_format(f):
-    f.data["format"][1] = 0
-
-
-def part_missing(f):
-    del f.data["regions"]
-
-
-EVERYWHERE = (
-    turned_direction, no_direction, directions_not_finite, lost_direction, uncounted_direction,
-    leaf_left_open, leaf_split, split_closed, unknown_code, axis_that_is_none, more_nodes,
-    fewer_nodes, split_outside, split_nowhere, splits_elsewhere, wide_region, narrow_region,
-    region_without_sides, solution_elsewhere, other_index, other_index_in_list, other_active_set,
-    point_not_listed, point_and_region_lost, point_listed_twice, point_out_of_nothing,
-    region_repeated, other_operation, unknown_operation, operation_on_itself, functions_exchanged,
-    empty_set, whole_space, unknown_function, open_boxes_not_counted, other_format, part_missing,
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("corrupt", EVERYWHERE, ids=lambda f: f.__name__)
+@pytest.mark.parametrize("corrupt", EVERYWHERE.values(), ids=list(EVERYWHERE))
 @pytest.mark.parametrize("name", ["parabola", "arc", "two discs"])
 def test_corrupted_files_are_refused(name, corrupt, proofs, tmp_path):
     file = File(proofs(name))
@@ -388,68 +332,37 @@ def test_corrupted_files_are_refused(name, corrupt, proofs, tmp_path):
     assert not fine, line
 
 
-def sign_of_symmetry(f):
-    f.data["symmetries"][0]["order"] = [0, 1]
-    f.data["symmetries"][0]["signs"] = [1, 1]
-    f.data["symmetries"][0]["shifts"] = ["0", "1/3"]
-
-
-def weights_turned(f):
-    f.data["weights"] = [(-float.fromhex(w)).hex() for w in f.data["weights"]]
-
-
-def no_symmetry(f):
-    f.data["symmetries"] = []
-
-
-def symmetry_that_scales(f):
-    f.data["symmetries"][0]["signs"][0] = 2
-
-
-def symmetry_without_rank(f):
-    f.data["symmetries"][0]["order"] = [0, 0]
-
-
-def wide_locus(f):
-    f.data["loci"][0].update(lower=[(0.0).hex()], upper=[(3.0).hex()])
-
-
-def no_locus(f):
-    f.data["loci"] = []
-
-
-def locus_in_another_coordinate(f):
-    f.data["loci"][0]["z"] = [1]
-
-
-def locus_elsewhere(f):
-    f.data["loci"][0].update(sharp_lower=[(0.25).hex()], sharp_upper=[(0.5).hex()])
-
-
-def locus_off_the_set(f):
-    f.data["loci"][0]["sample"][1] = (2.0).hex()
+SOMEWHERE = {
+    ("himmelblau", "other_constant"): other_constant,
+    ("camel", "other_constant"): other_constant,
+    ("two discs", "set_without_a_branch"): lambda f: f.data["branches"].pop(),
+    ("half turns", "sign_of_symmetry"): sign_of_symmetry,
+    ("half turns", "weights_turned"): lambda f: f.data.update(
+        weights=[(-float.fromhex(w)).hex() for w in f.data["weights"]]
+    ),
+    ("half turns", "no_symmetry"): put([], "symmetries"),
+    ("half turns", "symmetry_that_scales"): put(2, "symmetries", 0, "signs", 0),
+    ("half turns", "symmetry_without_rank"): put([0, 0], "symmetries", 0, "order"),
+    ("strip", "wide_locus"): lambda f: f.data["loci"][0].update(
+        lower=[(0.0).hex()], upper=[(3.0).hex()]
+    ),
+    ("strip", "no_locus"): put([], "loci"),
+    ("strip", "locus_in_another_coordinate"): put([1], "loci", 0, "z"),
+    ("strip", "locus_elsewhere"): lambda f: f.data["loci"][0].update(
+        sharp_lower=[(0.25).hex()], sharp_upper=[(0.5).hex()]
+    ),
+    ("strip", "locus_off_the_set"): put((2.0).hex(), "loci", 0, "sample", 1),
+    **dict.fromkeys(
+        [(name, "turned_direction") for name in ("strip", "ridge", "section")],
+        EVERYWHERE["turned_direction"],
+    ),
+}
 
 
 @pytest.mark.parametrize(
     ("name", "corrupt"),
-    [
-        ("himmelblau", other_constant),
-        ("camel", other_constant),
-        ("two discs", set_without_a_branch),
-        ("half turns", sign_of_symmetry),
-        ("half turns", weights_turned),
-        ("half turns", no_symmetry),
-        ("half turns", symmetry_that_scales),
-        ("half turns", symmetry_without_rank),
-        ("strip", wide_locus),
-        ("strip", no_locus),
-        ("strip", locus_in_another_coordinate),
-        ("strip", locus_elsewhere),
-        ("strip", locus_off_the_set),
-        ("strip", turned_direction),
-        ("ridge", turned_direction),
-        ("section", turned_direction),
-    ],
+    [(name, corrupt) for (name, _), corrupt in SOMEWHERE.items()],
+    ids=["-".join(key) for key in SOMEWHERE],
 )
 def test_other_corrupted_files_are_refused(name, corrupt, proofs, tmp_path):
     test_corrupted_files_are_refused(name, corrupt, proofs, tmp_path)
