@@ -1,12 +1,11 @@
 from .abundance import Richness, richness
 from .certificate import Certificate, Condition, Residuals, certify
-from .crossings import Crossing, crossing
 from .immobility import Immobility, Mobility, immobility
 from .methods import minimise, stationary_on
 from .multistart import minima
 from .outcomes import Minima
 from .problem import Problem
-from .sensitivities import Sensitivity, sensitivity
+from .sensitivities import Crossing, Sensitivity, crossing, sensitivity
 from .verdicts import Entrapment, Verdict
 
 __all__ = [

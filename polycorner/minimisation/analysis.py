@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
 from polycorner.minimisation.conditions import (
-    Curvature,
-    Multipliers,
     find_curvature,
     find_multipliers,
 )
@@ -100,8 +98,7 @@ def beside_inflection(a: Analysis) -> Analysis:
     Beside an inflection the wall may lie on either side of it.
     """
     strict = a.verdict is Verdict.STRICT_MINIMUM
-    point = a.local, a.active, a.gradients, a.multipliers, a.curvature
-    if not is_steady(*point, least=NEARLY_FLAT * a.small_curvature if strict else np.inf):
+    if not is_steady(a, least=NEARLY_FLAT * a.small_curvature if strict else np.inf):
         reason = "the second order changes as much as it is over a tiny distance"
         return replace(a, verdict=Verdict.UNDECIDED, decision=undecided(len(a.local.point), reason))
     return replace(a, verdict=Verdict.WEAK_MINIMUM) if strict else a
@@ -178,22 +175,15 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
     strong = [i for i in seen if i >= k or abs(values[i]) > small]
     weak = tuple(active[i] for i in seen if i < k and abs(values[i]) <= small)
     face = rows if len(strong) == len(seen) else Rows(gradients[strong], local.tolerances.rank)
-    hessian = _lagrangian_hessian(local, active, gradients, multipliers)
+    hessian = _hessian_with(local, numbers, gradients, multipliers.values)
     small_curvature = local.tolerances.curvature * max(local.reference, float(abs(hessian).max()))
     weak_rows = local.gradients[list(weak)]
     reach = local.tolerances.zero / 10
     curvature = find_curvature(hessian, face.null_space, weak_rows, small_curvature, left, reach)
-    if not weak and np.isfinite(hessian).all():
-        curvature = steady(
-            local, active, gradients, multipliers, curvature, NEARLY_FLAT * small_curvature
-        )
-    verdict = _verdict(
-        local, rows, local.away[list(active)], multipliers, curvature, small_curvature
-    )
     independent = rows.independent and not blind
     positive = np.array([i for i in strong if i < k and values[i] > small], dtype=np.int64)
     result = Analysis(
-        verdict=verdict,
+        verdict=Verdict.UNDECIDED,
         active=active,
         gradients=gradients,
         rank=rows.rank,
@@ -209,7 +199,10 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
         local=local,
         blind=blind,
     )
-    higher = local.higher != "none"
+    if not weak and np.isfinite(hessian).all():
+        result = steady(result)
+    verdict, higher = _verdict(result, rows), local.higher != "none"
+    result = result if verdict is Verdict.UNDECIDED else replace(result, verdict=verdict)
     if level and verdict not in {Verdict.NOT_STATIONARY, Verdict.NO_MULTIPLIER}:
         decision = undecided(len(local.point), UNRESOLVED)
         result = replace(result, decision=decision, verdict=Verdict.UNDECIDED)
@@ -345,12 +338,6 @@ def _basic_multipliers(a: Analysis, strong: list[int]) -> tuple[list[int], Array
     return used, values
 
 
-def _lagrangian_hessian(
-    local: Local, active: tuple[int, ...], rows: Array, multipliers: Multipliers
-) -> Array:
-    return _hessian_with(local, [*active, *local.sections], rows, multipliers.values)
-
-
 def _hessian_with(local: Local, numbers: list[int], rows: Array, values: Array) -> Array:
     """Return the Lagrangian's Hessian with given multipliers of unit gradients."""
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
@@ -358,25 +345,19 @@ def _hessian_with(local: Local, numbers: list[int], rows: Array, values: Array) 
     return np.asarray(local.hessians[-1] - np.tensordot(factors, local.hessians[numbers], axes=1))
 
 
-def _verdict(
-    local: Local,
-    rows: Rows,
-    away: Array,
-    multipliers: Multipliers,
-    curvature: Curvature,
-    small_curvature: float,
-) -> Verdict:
+def _verdict(a: Analysis, rows: Rows) -> Verdict:
     """Return the verdict before flat directions and weakly active functions are considered."""
-    if not multipliers.complementary(away, OPEN * local.small):
+    multipliers, curvature = a.multipliers, a.curvature
+    if a.open_positions:
         return Verdict.NOT_STATIONARY  # the gap is not rounding: closing it would change the energy
     if not multipliers.exist:
-        k = len(away)
+        k = len(a.active)
         regular = rows.independent
         if not regular and k:
             _, rate = inward_direction(rows.units[:k], rows.units[k:])
-            regular = rate > local.tolerances.rank
+            regular = rate > a.local.tolerances.rank
         return Verdict.NOT_STATIONARY if regular else Verdict.NO_MULTIPLIER
-    if curvature.decided and curvature.least < -small_curvature:
+    if curvature.decided and curvature.least < -a.small_curvature:
         # Other multipliers may prove a minimum where they are not unique.
         return Verdict.SADDLE if multipliers.unique else Verdict.UNDECIDED
     if not curvature.decided or curvature.flat.shape[1]:

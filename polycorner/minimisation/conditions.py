@@ -50,12 +50,6 @@ class Multipliers(Value):
         whole[:, positions] = self.values, self.lower, self.upper
         return replace(self, values=whole[0], lower=whole[1], upper=whole[2])
 
-    def complementary(self, away: Array, small: float) -> bool:
-        """Whether every product of a multiplier and its scaled gap is small."""
-        if not self.exist:
-            return True
-        return bool((abs(self.values[: len(away)] * away) <= small).all())
-
 
 def find_multipliers(
     rows: Rows, k: int, gradient: Array, small: float, most: float, dependent: float

@@ -11,13 +11,12 @@ from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import null_space
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import Tolerances
+from polycorner.tolerances import DEFAULT, Tolerances
 
 RADII = (0.1, 1.0, 10.0, 100.0)  # of random points, in scale units
 POINTS = 16  # at each radius
 FEWEST = 8  # finite gradients of a function from which a symmetry is read
 VANISHING = 1e-150  # relative size of a derivative that is underflow
-SYMMETRIC = 1e-13  # relative size of a derivative that is rounding
 LAST = 128.0  # distance followed, in scale units
 BENT = 0.05  # error of linear prediction, relative to the step, beyond which none is followed
 CONSTANT = 2e-14  # relative change of the energy that counts as rounding
@@ -98,7 +97,7 @@ def _combinations(slopes: Array) -> Array:
     if moving.any():
         scaled = found[:, moving] / sizes[moving]
         _, singular, right = np.linalg.svd(scaled)
-        level = int((singular > SYMMETRIC * singular[0]).sum())
+        level = int((singular > DEFAULT.rounding * singular[0]).sum())
         others = np.zeros((n, len(right) - level))
         others[moving] = right[level:].T / sizes[moving, None]
         basis = np.hstack([basis, others])

@@ -22,8 +22,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.minimisation.conditions import Curvature, Multipliers
 from polycorner.minimisation.constancy import without
+from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.findings import Analysis, Local, steepest_descent
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import Rows
@@ -95,66 +95,47 @@ def _jump(
 # --------------------------------------------------------------- inflections
 
 
-def steady(
-    local: Local,
-    active: tuple[int, ...],
-    gradients: Array,
-    multipliers: Multipliers,
-    curvature: Curvature,
-    nearly: float,
-) -> Curvature:
+def steady(a: Analysis) -> Analysis:
     """Count as flat what bends up here and not as much a little further on.
 
-    Looked at are the direction that bends most and those that bend much less, but
-    more than ``nearly``, up to which all are flat.
+    Looked at are the direction that bends most and those that bend much less, but not so little
+    that all of them are flat.
     """
+    curvature, nearly = a.curvature, NEARLY_FLAT * a.small_curvature
     values, vectors = curvature.values, curvature.vectors
     if not len(values) or values[-1] <= 0:
-        return curvature
+        return a
     tried = (values > nearly) & (values <= FAINT * values[-1])
     tried[-1] = True
-    level = _changes(local, active, gradients, multipliers, curvature, tried)
+    level = _changes(a, tried)
     if not level.any():
-        return curvature
+        return a
     flat = without(np.hstack([curvature.flat, vectors[:, level]]), np.zeros((len(vectors), 0)))
-    return replace(curvature, flat=flat)
+    return replace(a, second=replace(curvature, flat=flat))
 
 
-def is_steady(
-    local: Local,
-    active: tuple[int, ...],
-    gradients: Array,
-    multipliers: Multipliers,
-    curvature: Curvature,
-    *,
-    least: float,
-) -> bool:
+def is_steady(a: Analysis, *, least: float) -> bool:
     """Whether the largest curvature and those beyond ``least`` are as much a little further on."""
-    sizes = abs(curvature.values)
+    sizes = abs(a.curvature.values)
     if not sizes.any():
         return True
     tried = (sizes > least) | (sizes == sizes.max())
-    return not _changes(local, active, gradients, multipliers, curvature, tried).any()
+    return not _changes(a, tried).any()
 
 
-def _changes(
-    local: Local,
-    active: tuple[int, ...],
-    gradients: Array,
-    multipliers: Multipliers,
-    curvature: Curvature,
-    tried: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+def _changes(a: Analysis, tried: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return the mask of the directions tried in which the curvature changes beside the point.
 
     At the distance ``h`` from where curvature and slope vanish together as ``h^(p - 2)`` and
     ``h^(p - 1)``, Newton's step has the length ``h / (p - 1)``.
     """
-    values, ways = curvature.values[tried], curvature.vectors[:, tried].T
-    numbers = [*active, *local.sections]
+    values, ways = a.curvature.values[tried], a.curvature.vectors[:, tried].T
+    local, gradients = a.local, a.gradients
+    numbers = [*a.active, *local.sections]
     with np.errstate(all="ignore"):
         sizes = np.maximum(np.sqrt((gradients * gradients).sum(axis=1)), 1e-300)
-        left = local.gradients[-1] - (multipliers.values / sizes) @ gradients
+        shares = a.multipliers.values / sizes
+        left = local.slope - shares @ gradients
         newton = abs(ways @ left) / abs(values)
         newton[np.isnan(newton)] = 0.0
         reach = local.tolerances.difference * (1 + abs(local.point / local.problem.scales).max())
@@ -163,7 +144,7 @@ def _changes(
         hessians = local.problem.evaluate(points, 2)[2]
         both = np.vstack([ways, ways])[:, :, None]
         bends = (both.transpose(0, 2, 1)[:, None] @ hessians @ both[:, None])[:, :, 0, 0]
-        moved = bends[:, -1] - bends[:, numbers] @ (multipliers.values / sizes)
+        moved = bends[:, -1] - bends[:, numbers] @ shares
         changed = abs(moved.reshape(2, -1) - values) > 0.5 * abs(values)
     level = np.zeros(len(tried), dtype=np.bool_)
     level[tried] = changed.any(axis=0)

@@ -35,8 +35,6 @@ from polycorner.values import cached_property
 # The derivatives of the formulas' parameters, by name, by each parameter.
 Rates = Mapping[str, Mapping[str, float]]
 
-SINGULAR = 1e-13  # reciprocal condition number of a matrix that counts as singular
-
 
 @dataclass(frozen=True, eq=False)
 class Linear:
@@ -89,7 +87,7 @@ class Linear:
         (k, n), p, reference = self.rows.shape, self.turning.shape[1], a.reference
         sizes = np.linalg.norm(self.rows, axis=1)
         matrix = bordered(self.curvature / reference, np.vstack([unit_rows(self.rows), free.T]))
-        if not np.linalg.cond(matrix) < 1 / SINGULAR:
+        if not np.linalg.cond(matrix) < 1 / a.local.tolerances.rounding:
             return None
         right = np.zeros((len(matrix), p))
         right[:n] = -self.turning / reference

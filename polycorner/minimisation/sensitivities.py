@@ -1,4 +1,4 @@
-"""Derivatives of stationary points, their energies and multipliers by parameters.
+"""Derivatives of stationary points by parameters, and parameters at which a multiplier vanishes.
 
 A stationary point ``q`` of the energy on a face and its multipliers ``lam`` solve
 
@@ -25,7 +25,14 @@ from polycorner import checks
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.minimisation.certificate import LONGEST, Certificate
-from polycorner.minimisation.parametric import Lifted, Rates, check_rates, partial_derivatives
+from polycorner.minimisation.parametric import (
+    Lifted,
+    Linear,
+    Rates,
+    bordered,
+    check_rates,
+    partial_derivatives,
+)
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.polyhedra.strata import local_pieces
 from polycorner.printing import Printed, Sheet, Table, names, number, titled, units
@@ -36,6 +43,8 @@ if TYPE_CHECKING:
     import sympy
 
     Quantity: TypeAlias = SmoothFunction | sympy.Expr | str
+
+NEWTON = 40  # steps, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,3 +249,94 @@ def _check_point(certificate: Certificate) -> None:
         _refuse(f"the multiplier of {weak} is zero, so that derivatives are one-sided")
     if a.verdict is Verdict.UNDECIDED or (a.decision is not None and a.decision.degree > 2):
         _refuse("the second order vanishes in a direction that is not free")
+
+
+# --------------------------------------------------------------- vanishing multipliers
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing(Checked):
+    """A point at which the multiplier of a contact vanishes; see :func:`crossing`.
+
+    Attributes
+    ----------
+    change : float
+        Difference of the parameter from its value in the certificate.
+    point : (n,) array
+        The point.
+    multipliers : dict from str to float
+        All multipliers there.
+    """
+
+    change: float
+    point: Array
+    multipliers: dict[str, float]
+
+
+@checked
+def crossing(
+    certificate: Certificate, contact: str, parameter: str | Mapping[str, float]
+) -> Crossing | None:
+    """Find the value of a parameter at which a multiplier vanishes, by Newton's method.
+
+    The unknowns are the point, the multipliers and the parameter; the equations are those of the
+    face, and ``lam_contact = 0``.
+
+    Parameters
+    ----------
+    certificate : Certificate
+        A point stationary on its face, with independent gradients, to start from.
+    contact : str
+        The active function whose multiplier is to vanish.
+    parameter : str or mapping from str to float
+        A parameter of the problem's functions, or several of them with their rates.
+
+    Returns
+    -------
+    Crossing or None
+        None if Newton's method does not converge.
+
+    Raises
+    ------
+    ValueError
+        For a contact that is not active, or an unknown parameter.
+    """
+    moved = {parameter: 1.0} if isinstance(parameter, str) else dict(parameter)
+    rates = check_rates(certificate, {"parameter": moved})
+    lifted = Lifted(certificate)
+    checks.choice("contact", contact, lifted.names)
+    directions, which = lifted.directions(rates)[:, 0], lifted.names.index(contact)
+    scales, wrap = certificate.problem.scales, certificate.problem.polyhedron.manifold.canonical
+    lam = np.array(list(certificate.analysis.named_multipliers.values()))
+    q, s, free, last = certificate.point, 0.0, None, False
+    for _ in range(NEWTON):
+        linear = lifted.linearise(q, s * directions, lam, directions[:, None])
+        free = linear.free_directions(certificate) if free is None else free
+        step = _augmented_step(linear, free, lam, which)
+        if not np.isfinite(step).all():
+            return None
+        du, dlam, ds = step[: len(q)], step[len(q) : len(q) + len(lam)], float(step[-1])
+        q, lam, s = q + scales * du, lam + dlam, s + ds
+        if last:
+            named = dict(zip(lifted.names, lam.tolist(), strict=True))
+            return Crossing(s, wrap(q), certificate.analysis.stated(named))
+        last = max(abs(du).max(), abs(ds / (s or 1.0))) < certificate.tolerances.settled
+    return None
+
+
+def _augmented_step(linear: Linear, free: Array, multipliers: Array, which: int) -> Array:
+    """Return Newton's step ``(du, dlam, dnu, ds)``, NaN if the matrix is singular."""
+    rows, n, k = linear.rows, len(linear.slope), len(multipliers)
+    core = bordered(linear.curvature, np.vstack([rows, free.T]))
+    matrix = np.zeros((len(core) + 1, len(core) + 1))
+    matrix[:-1, :-1] = core
+    matrix[:n, -1], matrix[n : n + k, -1] = linear.turning[:, 0], linear.drift[:-1, 0]
+    matrix[-1, n + which] = 1.0
+    residual = np.zeros(len(matrix))
+    residual[:n] = linear.slope - multipliers @ rows
+    residual[n : n + k] = linear.values
+    residual[-1] = multipliers[which]
+    try:
+        return np.asarray(np.linalg.solve(matrix, -residual), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.full(len(matrix), np.nan)
