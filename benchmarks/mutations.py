@@ -19,7 +19,7 @@ from side_by_side import ROOT, write
 
 # In brackets the tests that have to notice; then files, a text that occurs once, and another one.
 MUTATIONS = """
-[spaces]
+[spaces dumbbells/test_pair_gaps.py]
 spaces/factors.py: across < 0, -1.0 => across > 0, -1.0
 spaces/distances.py: 0 < past_second, past_second < nn => 0 < past_second
 spaces/embedding.py: np.sinc(angle / np.pi) * along => np.sinc(angle) * along
@@ -29,7 +29,7 @@ polyhedra/nerves.py: if death < birth: => if death <= birth:
 polyhedra/affine.py: aim[n] - result.fun => aim[n] + result.fun
 polyhedra/strata.py: dimension=polyhedron.dimension - r, => dimension=polyhedron.dimension,
 [formulas/test_interval_kernels.py intervals]
-intervals/balls.py: lambda x, y: x > 0 or (_whole => lambda x, y: x >= 0 or (_whole
+intervals/balls.py: 1 / (2 * y) => 1 / y
 intervals/balls.py: down, up = lower // unit, -(-upper => down, up = lower // unit, (upper
 formulas/interval_library.py: low = b.fsub(r.fold(ends, => low = b.fadd(r.fold(ends,
 formulas/interval_library.py: ">=", r.call("floor", last) => ">", r.call("floor", last)
@@ -44,42 +44,46 @@ bodies/masses.py: length**2 / 4 + 3 * r => length**2 / 4 + r
 bodies/masses.py: about - amount * np.outer(away, away)) => about)
 bodies/lattices.py: max(1.0, 2 * reach => max(1.0, reach
 bodies/sizes.py: s - (1 - c) * moving => s - c * moving
-bodies/congruences.py: np.linalg.det(matrix) < 0 => np.linalg.det(matrix) > 0
+bodies/congruences.py: return mirrors, round( => return mirrors, 0 * round(
 [minimisation]
 minimisation/copositivity.py: x = 1.0 / m - np.einsum => x = 1.0 / m + np.einsum
 minimisation/conditions.py: (values[:k] >= -small).all() => (values >= -small).all()
 minimisation/conditions.py: target[i] = -side * np.inf => target[i] = side * np.inf
 minimisation/sensitivities.py: if len(weak): => if len(weak) > 1:
 minimisation/descent/sqp.py: energy + 1e-4 * factor => energy - 1e-4 * factor
-[motion]
+[motion/test_forces.py motion/test_friction.py motion/test_impacts.py]
 motion/lagrange.py: g.add(g.sub(rest[i], rise.get => g.sub(g.sub(rest[i], rise.get
 motion/friction.py: (abs(p[..., 1]) <= top) => (abs(p[..., 1]) <= c)
 motion/trajectory.py: total[0] - worked + lost => total[0] - worked - lost
+[motion/test_rotations.py]
 motion/rotations.py: / 2 + 2 * mean * => / 2 + mean *
+[motion/engine motion/test_friction.py motion/test_textbook_friction.py]
 motion/engine/sets.py: abs(x) <= b * top => abs(x) <= a * top
-[skeletons]
+[skeletons/test_tips.py skeletons/test_degenerate_points.py skeletons/test_skeleton.py]
 skeletons/indices.py: low & ~before => low & before
 skeletons/sectors.py: < 1 - tolerances.dependent => < 1
-[sweeps files cli dumbbells/cli test_container.py]
+[sweeps/test_refusals.py sweeps/test_values.py files test_container.py cli dumbbells/cli]
 sweeps/grid.py: np.isnan(array).any() => np.isnan(array).all()
 files/skeleton_forms.py: > active and operator.eq => >= active and operator.eq
 container.py: if not stored or sum( => if stored and sum(
 cli/report.py: b if a == corner else a for => a if a == corner else b for
-[proofs]
+[proofs/test_krawczyk.py proofs/test_verification.py proofs/test_exact.py proofs/test_invariance.py]
 proofs/krawczyk.py: w.contains_interior(x) => w.contains(x)
 proofs/definite.py: nrows() and all(pivot > 0 for pivot in found) => nrows()
 proofs/polynomials.py: + sign * weight => + weight
+[proofs/lists/test_forged_lists.py proofs/lists/test_checker.py proofs/lists/test_contraction.py]
 proofs/lists/checker/faces.py: all(x > 0 for x in found[: len(self.active)]) => True
 proofs/lists/directions.py: UNIT * size - TINY => UNIT * size + 2 * TINY
-[models pictures]
+[models/wells/test_escape.py models/disks/test_critical.py]
 models/wells/escape.py: -near[:-1] / (far => near[:-1] / (far
 models/disks/critical_points.py: bool(fewest < index or not => bool(not
+[pictures/solids]
 pictures/solids/edge_collapse.py: free | (lengths < COINCIDENT) => free
 [dumbbells/test_pair_energy.py dumbbells/test_drum_formulas.py dumbbells/test_symmetries.py]
 dumbbells/formulas.py: sympy.sin(theta) / (2 * rho)) ** 2) => sympy.sin(theta) / rho) ** 2)
 dumbbells/drum_formulas.py: sign * (r - t)) / 2 => sign * (r + t)) / 2
 dumbbells/symmetries.py: [y1, -x1, 1, y2, -x2, 1] => [y1, -x1, 1, y2, x2, 1]
-[dumbbells/statics dumbbells/dynamics dumbbells/test_turning.py]
+[dumbbells/statics/test_keel.py dumbbells/dynamics dumbbells/test_turning.py]
 dumbbells/statics/keel.py: - phi * pull => + phi * pull
 dumbbells/dynamics/steady.py: 2 * self.drift.error => 3 * self.drift.error
 """

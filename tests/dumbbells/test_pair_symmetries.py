@@ -16,25 +16,7 @@ NAMES = oracles.CONTACTS
 
 def exchange(letters):
     """Return where each contact comes from when labels are exchanged, such as A1 with A2."""
-
-    def renamed(name):
-        return "".join(letters.get(part, part) for part in _labels(name))
-
-    return [NAMES.index(_ordered(renamed(name))) for name in NAMES]
-
-
-def _labels(name):
-    """Split ``A1b`` into ``A1`` and ``b``."""
-    parts, rest = [], name
-    while rest:
-        size = 2 if rest[0] in "AB" else 1
-        parts, rest = [*parts, rest[:size]], rest[size:]
-    return parts
-
-
-def _ordered(name):
-    """Write the contact with the part of the first dumbbell first."""
-    return "".join(sorted(_labels(name), key=str.lower))
+    return [NAMES.index(oracles.renamed(name, letters)) for name in NAMES]
 
 
 SWAPPED = exchange({"A1": "B1", "A2": "B2", "B1": "A1", "B2": "A2", "a": "b", "b": "a"})

@@ -69,7 +69,8 @@ def test_every_operation_of_programs_is_known_and_has_an_oracle():
     assert set(ANALYTIC) <= set(PARTIALS)
 
 
-@given(st.sampled_from(sorted(ONE)), numbers, widths, shares, st.sampled_from([24, 53, 150]))
+@pytest.mark.parametrize("op", ONE)
+@given(middle=numbers, width=widths, share=shares, bits=st.sampled_from([24, 53, 150]))
 def test_one_argument_lands_in_the_result(op, middle, width, share, bits):
     with mpmath.workdps(DIGITS), precision(bits):
         x, inside = sides(middle, width, share)
@@ -78,7 +79,8 @@ def test_one_argument_lands_in_the_result(op, middle, width, share, bits):
         assert within(ONE[op](precise(inside)), result)
 
 
-@given(st.sampled_from(sorted(TWO)), numbers, numbers, widths, shares, shares)
+@pytest.mark.parametrize("op", TWO)
+@given(first=numbers, second=numbers, width=widths, one=shares, other=shares)
 def test_two_arguments_land_in_the_result(op, first, second, width, one, other):
     with mpmath.workdps(DIGITS), precision(53):
         x, a = sides(first, width, one)
@@ -90,7 +92,8 @@ def test_two_arguments_land_in_the_result(op, first, second, width, one, other):
         assert within(value, result)
 
 
-@given(st.sampled_from(sorted(PARTIALS)), st.lists(numbers, min_size=2, max_size=2), widths, shares)
+@pytest.mark.parametrize("op", PARTIALS)
+@given(middles=st.lists(numbers, min_size=2, max_size=2), width=widths, share=shares)
 def test_partial_derivatives_land_in_their_enclosures(op, middles, width, share):
     function = (ONE | TWO)[op]
     with mpmath.workdps(DIGITS), precision(80):

@@ -156,7 +156,7 @@ def test_figures(capsys, tmp_path):
     assert out.count("wrote ") == len(list(tmp_path.iterdir())) == 2
 
 
-def test_mistakes_with_figures_and_folders(capsys, tmp_path):
+def test_mistakes_with_figures(capsys, tmp_path):
     out = ("--out", str(tmp_path))
     code, _, err = run(capsys, "figures", "nosuch", *out)
     assert (code, err) == (
@@ -165,11 +165,6 @@ def test_mistakes_with_figures_and_folders(capsys, tmp_path):
     )
     code, _, err = run(capsys, "figures", "--section", "2", *out)
     assert (code, err.count("\n")) == (2, 1)
-    (tmp_path / "file").touch()
-    code, told, err = run(capsys, "G4", "--out", str(tmp_path / "file" / "folder"))
-    assert (code, told) == (2, "")
-    assert err.startswith("polycorner: --out: ")
-    assert err.count("\n") == 1
 
 
 def test_help(capsys):

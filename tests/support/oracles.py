@@ -168,6 +168,12 @@ def fastest_rate(a, e):
 # --------------------------------------------------------------------------------------- dumbbells
 
 
+def renamed(name, images):
+    """Return a contact after its balls and rods were renamed, the part of A first."""
+    parts = (name[:2], name[2:]) if name[1].isdigit() else (name[:1], name[1:])
+    return "".join(sorted((images.get(part, part) for part in parts), key=str.lower))
+
+
 def balls(pair, q):
     """Return the centres of A1, A2, B1, B2 ``(..., 4, 3)`` from the definition.
 

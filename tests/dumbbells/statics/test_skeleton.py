@@ -213,8 +213,7 @@ def renamed(name, permutation):
     """Return a contact after its balls were permuted; a rod goes with its balls."""
     image = {BALLS[i]: BALLS[k] for i, k in enumerate(permutation)}
     image |= {"a": image["A1"][0].lower(), "b": image["B1"][0].lower()}
-    parts = (name[:2], name[2:]) if name[1].isdigit() else (name[:1], name[1:])
-    return "".join(sorted((image[part] for part in parts), key=str.lower))
+    return oracles.renamed(name, image)
 
 
 class Classes:

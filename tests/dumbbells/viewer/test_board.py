@@ -15,7 +15,7 @@ from polycorner.dumbbells.viewer.board import Board, atlas_place, trail
 from polycorner.dumbbells.viewer.sliders import (
     BUTTONS,
     MESSAGE,
-    RefusedError,
+    UnknownMessageError,
     coordinates,
     parsed,
     sliders_for,
@@ -181,5 +181,5 @@ def test_buttons_are_understood(button):
     ],
 )
 def test_everything_else_is_refused(message):
-    with pytest.raises(RefusedError, match=r"^([a-zA-Z_]+: )?expected [a-zA-Z]"):
+    with pytest.raises(UnknownMessageError, match=r"^([a-zA-Z_]+: )?expected [a-zA-Z]"):
         parsed(message, SLIDERS)
