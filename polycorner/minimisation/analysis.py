@@ -43,8 +43,9 @@ from polycorner.polyhedra.cones import (
     rank,
     unit_rows,
 )
-from polycorner.polyhedra.faces import Face
+from polycorner.polyhedra.faces import project
 from polycorner.polyhedra.polyhedron import Piece
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.strata import local_pieces
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
@@ -74,11 +75,12 @@ def corner(local: Local, active: tuple[int, ...]) -> Local | None:
     it from the corner.  None where it is the corner, or where none is found as near.
     """
     held, problem, tolerances = [*active, *local.sections], local.problem, local.tolerances
-    face = Face(lambda q: problem.evaluate(q, 1), problem.scales, held, tolerances)
-    point, settled = face.project(local.point, steps=NEWTON)
+    quotient = Quotient(problem.polyhedron, tolerances=tolerances, equations=tuple(local.sections))
+    arrival = project(quotient, local.point, active, steps=NEWTON)
+    point = arrival.point.q
     moved, u = abs(point - local.point) / problem.scales, abs(point / problem.scales)
     rounding = tolerances.rounding * (1.0 + float(u.max()))
-    if not (settled and rounding < moved.max() <= OPEN * tolerances.zero):
+    if not (arrival.settled and rounding < moved.max() <= OPEN * tolerances.zero):
         return None
     exact = Local.at(problem, point, tolerances, local.higher)
     return exact if abs(exact.away[held]).max() <= rounding else None

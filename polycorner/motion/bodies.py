@@ -12,7 +12,9 @@ from polycorner.motion.formulation import Formulation
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
-IMPACT, RUBBING = "impact", "rubbing"  # causes of dissipation
+# Causes of dissipation.
+IMPACT = "impact"
+RUBBING = "rubbing"
 
 
 @dataclass(frozen=True)

@@ -217,7 +217,7 @@ class _Slopes:
         return parts[0] if len(parts) == 1 else total(parts, "add")
 
     def _rational_slope(
-        self, op: str, a: int, children: list[int], slopes: list[Polynomial]
+        self, op: str, a: int, children: Sequence[int], slopes: list[Polynomial]
     ) -> Polynomial:
         """Return the slope of a product, a quotient, an angle or a logarithm."""
         if op == "log":
