@@ -91,9 +91,6 @@ class MovingBody(Value):
     slow_signals: bool = False
 
 
-Body = MovingBody  # as the engine calls it
-
-
 @dataclass(frozen=True)
 class PairLaw(Value):
     """One law of friction between bodies, which holds at each of their gaps.
