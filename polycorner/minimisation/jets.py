@@ -177,11 +177,13 @@ def _elementary(op: str) -> _Rule:
         t, y = line.constant(a[0, 0]) + line.variable(0), line.constant(value(a[0, 0]))
         y[0, 1:] = np.nan  # not known yet: a slope that reads y gives one coefficient after another
         for _ in orders[1:]:
-            slope = known.slope(_Series(line), t, y, line.constant(1.0))[0]
-            y[0, 1:] = slope[:-1] / orders[1:]
+            slope = known.slope(_Series(line), t, y, line.constant(1.0))
+            y[:, 1:] = slope[:, :-1] / orders[1:]
             if np.isfinite(y[0]).all():
                 break
-        return domain.compose(y[0], a)
+        found = domain.compose(y[0], a)
+        found[1] += domain.compose(y[1], abs(a))[0]  # what is rounded in the coefficients
+        return found
 
     return rule
 
