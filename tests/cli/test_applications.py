@@ -1,5 +1,6 @@
 """Commands of applications: found by their entry points, and what is said where one is missing."""
 
+import re
 from importlib import metadata
 from importlib.metadata import EntryPoint
 
@@ -16,7 +17,8 @@ COMMANDS = "polycorner.commands"
 @pytest.fixture
 def registering(monkeypatch):
     """Let applications register given commands, as names and values of entry points."""
-    monkeypatch.setattr(cli, "commands", {})  # those that were loaded before
+    own = {"completion": cli.commands["completion"]}
+    monkeypatch.setattr(cli, "commands", own)  # without those that were loaded before
     monkeypatch.delitem(atlas.commands, "dyad", raising=False)
 
     lazy.registered.cache_clear()
@@ -51,7 +53,8 @@ def test_an_application_that_cannot_be_loaded_is_one_sentence(capsys, registerin
     assert err.startswith("polycorner: broken: ")
     assert why in err
     code, out, _ = commands.run(capsys, "--help")
-    assert (code, "broken      (cannot be loaded)" in out) == (0, True)
+    assert code == 0
+    assert re.search(r"broken +\(cannot be loaded\)", out)
 
 
 @pytest.mark.parametrize("words", [("drum",), ("atlas", "dyad")])

@@ -31,8 +31,8 @@ REASONS = {
         Cylinder.numbers HalfSpace.family HalfSpace.numbers Manifold.canonical Manifold.image
         Manifold.moved System.sticks Manifold.onto Manifold.placed Part.moved Polyhedron.implicit_of
         Polyhedron.selections Polyhedron.signs_to_pieces Problem.check_energy
-        Problem.check_parameters Problem.descend Problem.equations_hold Problem.evaluate
-        Problem.mask Problem.on_face Problem.probe Problem.restore Problem.stated
+        Problem.check_parameters Problem.descend Problem.holds Problem.evaluate
+        Problem.mask Problem.on_face Problem.restore Problem.stated
         Problem.with_independent_equations TorusDisks.distances UnevenFriction.numbers""",
     ENUMERATION: """Completeness Consistency End Entrapment EventKind LocalType Mobility Status
         Verdict""",
