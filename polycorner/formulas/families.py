@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from polycorner.checks import about, names, reals, refuse, whole
 from polycorner.formulas.expressions import as_expression, kinks
-from polycorner.formulas.kernels import address
 from polycorner.formulas.programs import Program
 from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
 from polycorner.formulas.translate import compile_expressions
@@ -181,6 +180,8 @@ class Family(Checked):
         tuple of arrays
             Values ``(..., m)``, gradients ``(..., m, k)``, Hessians ``(..., m, k, k)``.
         """
+        from polycorner.formulas.kernels import address
+
         k, p = len(self.variables), len(self.parameters)
         at, numbers = reals("points", points), np.atleast_1d(reals("parameters", parameters))
         if not at.ndim or at.shape[-1] != k:
