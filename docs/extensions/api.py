@@ -93,6 +93,7 @@ GROUPS = (
             "": "skeleton Skeleton",
             "skeletons": "Corner Edge Face Contact End Budget Completeness resume traced "
             "examine_faces",
+            "polyhedra": "WalkOptions",
         },
     ),
     Group(

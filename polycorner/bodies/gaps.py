@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     Formulas = tuple[Expressions, Expressions]
 
 FIRST, SECOND = "_1_", "_2_"  # the bodies in roles 1 and 2
-# Edges of two polyhedra whose directions differ by less than this sine separate nothing.
-PARALLEL = 1e-9
 # The conditions under which two edges span a face of the difference of two polyhedra.
 SUPPORTS = ("left1", "right1", "left2", "right2")
 CROSSING = ("gap", *SUPPORTS, "angle")
@@ -294,7 +292,8 @@ def _crossing(one: Frame, two: Frame) -> "Formulas":
     (o,) = symbols(["o"])
     u, v = _along("u", FIRST, one, 3), _along("v", SECOND, two, 3)
     w = tuple(o * c for c in cross(u, v))
-    bound = PARALLEL**2 * dot(u, u) * dot(v, v)
+    parallel = 1e-9  # sine between the directions of edges below which they separate nothing
+    bound = parallel**2 * dot(u, u) * dot(v, v)
     normal = (wx, wy, wz)
     definitions = dict(zip(names, (*w, dot(normal, normal), bound), strict=True))
     apart = dot(normal, minus(_at("q", SECOND, two, 3), _at("p", FIRST, one, 3)))

@@ -22,8 +22,6 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
-ALONG = 1e-6  # 1 minus the cosine of the angle to x up to which an axis counts as along it
-
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace(Checked):
@@ -148,7 +146,8 @@ class Cylinder(Checked):
         """The directions of the azimuths 0 and a quarter turn, ``(2, d)``."""
         if self.axis is None:
             return np.eye(2)
-        first = np.eye(3)[int(abs(self.axis[0]) > 1 - ALONG)]
+        is_along_x = abs(self.axis[0]) > 1 - 1e-6
+        first = np.eye(3)[int(is_along_x)]
         start = first - (first @ self.axis) * self.axis
         start /= np.linalg.norm(start)
         return np.stack([start, np.cross(self.axis, start)])

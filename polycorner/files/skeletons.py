@@ -3,6 +3,7 @@
 import operator
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from itertools import starmap
 from pathlib import Path
@@ -33,7 +34,7 @@ from polycorner.forms import (
 )
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.quotients import Quotient
+from polycorner.polyhedra.quotients import Quotient, WalkOptions
 from polycorner.polyhedra.strata import distances
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
@@ -48,7 +49,7 @@ from polycorner.skeletons.search import UNFINISHED
 from polycorner.skeletons.states import SearchState
 from polycorner.skeletons.tracing import FIGURE
 from polycorner.skeletons.vertex_figures import corner_rank
-from polycorner.skeletons.walks import LONGEST_STEP, End
+from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, Tolerances
 
@@ -96,6 +97,7 @@ def save_skeleton(skeleton: Skeleton, path: str | os.PathLike[str], *, label: st
         "tolerance": explorer.quotient.tolerances.zero,
         "rank tolerance": explorer.quotient.tolerances.rank,
         "extent": written_number(explorer.quotient.extent),
+        "options": asdict(explorer.quotient.options),
         "corners": [_corner(explorer, record) for record in explorer.records],
         "edges": [_curve(curve) for curve in explorer.curves],
         "crossings": [[_flag(p.start), _flag(p.stop)] for p in explorer.crossings],
@@ -177,7 +179,9 @@ def _explorer(content: Entries, polyhedron: Polyhedron, symmetry: Symmetry) -> "
         return f"symmetry: written {words[0]}, found {words[1]}"
     tolerances = Tolerances.of(sized["tolerance"], sized.get("rank tolerance", RANK_TOLERANCE))
     points = starts + edges + corners
-    quotient = Quotient.near(polyhedron, symmetry, tolerances, sized["extent"], points)
+    options = sized.get("options", WalkOptions())
+    quotient = Quotient(polyhedron, symmetry, tolerances, sized["extent"], options=options)
+    quotient = quotient.near(points)
     explorer = Explorer(quotient, [], read_generator("random", content["random"]))
     for k, (corner, q) in enumerate(zip(sized["corners"], corners, strict=True)):
         active = frozenset(map(polyhedron.names.index, corner["active"]))
@@ -281,8 +285,14 @@ def _read_sizes(content: Entries, n: int, m: int) -> Entries:
         "notes": many(text),
         "lost": forms.flag,
     }
+    several = ("distances", "samples", "radii")
+    options = {
+        name: many(number(above=0)) if name in several else number(above=0)
+        for name in asdict(WalkOptions())
+    }
     later = {
         "rank tolerance": number(above=0, below=1),
+        "options": made(entries(options), lambda read: WalkOptions(**read)),
         "patches": many(row(active, point)),
         "origins": many(point),
     }
@@ -400,7 +410,7 @@ def _check_curve(place: str, curve: Curve, explorer: Explorer) -> None:
         checks.refuse(f"{place}.active", "all that vanish along the edge", sorted(active))
     chords = np.diff(points, axis=0) / explorer.scales
     # Two walks at most, whose last step is at most half as long as the extent.
-    longest = 3 * (quotient.extent + LONGEST_STEP)
+    longest = 3 * (quotient.extent + quotient.options.longest_step)
     if not np.linalg.norm(chords, axis=1).sum() <= longest:
         checks.refuse(
             f"{place}.points", f"an edge of a length of at most {longest:g}", "a longer one"

@@ -1,6 +1,7 @@
 from .groups import AllOf, AnyOf
 from .nerves import Bar, Nerve, nerve
 from .polyhedron import Polyhedron
+from .quotients import WalkOptions
 from .strata import LocalType, Stratum, stratum_at
 from .symmetry import Element, Symmetry
 
@@ -14,6 +15,7 @@ __all__ = [
     "Polyhedron",
     "Stratum",
     "Symmetry",
+    "WalkOptions",
     "nerve",
     "stratum_at",
 ]

@@ -20,8 +20,6 @@ from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
-# Smallest diagonal entry of a triangular factor of unit gradients that is not rounding.
-SINGULAR = 1e-14
 NEWTON = 8
 STEPS = 50  # where gradients may be dependent
 WORK = 64  # floats that LAPACK may use to apply reflections to one vector
@@ -179,7 +177,9 @@ def project(
     for _ in range(steps):
         point = HeldPoint(quotient, q, kept, orbit)
         orbit = point.orbit
-        if not point.finite or (point.condition < SINGULAR and not dependent):
+        # Smaller diagonal entries of the triangular factor are rounding.
+        singular = point.condition < tolerances.rounding / 10
+        if not point.finite or (singular and not dependent):
             return Arrival(point, settled=False)
         step = point.truncated(along) if dependent else point.correction()
         size = math.sqrt(float(step @ step))

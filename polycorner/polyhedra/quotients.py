@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner import checks
 from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
 from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -15,10 +17,95 @@ from polycorner.polyhedra.strata import distances, evaluated, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT, Tolerances
-from polycorner.values import Value, cached_property
+from polycorner.values import Checked, Value, cached_property
 
 # Tolerances within which a gradient must keep its direction.
 VICINITY = 10.0
+
+
+@dataclass(frozen=True)
+class WalkOptions(Checked):
+    """The steps of walks in a skeleton, and the distances at which corners are looked at.
+
+    Lengths are in the scale units of the manifold; about a singular corner, in the radius of a
+    small sphere.  The defaults are for sets whose features are of the size of the scales.
+
+    Attributes
+    ----------
+    first_step, longest_step, shortest_step : float
+        Steps of a walk: at its start, at most near the start, and at least: one that has to be
+        shorter ends the walk.
+    turn : float
+        Largest turn of the tangent in a step, in radians.
+    stray : float
+        Deviation from the tangent, relative to the step, that is allowed besides what the turn
+        explains; a larger one leads to another curve.
+    tip : float
+        Distance from the end of a walk at which a singular point is looked for.
+    distances : (float, float, float)
+        Distances from a singular corner, decreasing, at which its edges are looked for.
+    samples : tuple of float
+        The same for a regular corner; those below ten tolerances are left out.
+    radii : tuple of float
+        Radii of the spheres about a singular corner, of which two in succession must agree.
+    link_extent : float
+        Length, in radii, after which a walk on such a sphere ends.
+    least_patch : float
+        Radius of the smallest patch of a net that covers a face.
+    reached : float
+        Distance from zero that minimisation reaches, and at which a start is moved in.
+    definite : float
+        Eigenvalue of a second derivative, relative to the largest, that is not taken for zero.
+    straight : float
+        Deviation from 1 of the cosine between two directions up to which they are one.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Unless all are positive, ``shortest_step < first_step <= longest_step``, the turn is less
+        than a right angle, and distances, samples and radii decrease.
+
+    See Also
+    --------
+    polycorner.skeleton : which takes them as ``options``.
+    """
+
+    first_step: float = 0.2
+    longest_step: float = 0.5
+    shortest_step: float = 1e-7
+    turn: float = 0.25
+    stray: float = 0.01
+    tip: float = 1e-2
+    distances: tuple[float, float, float] = (3e-3, 1e-3, 3e-4)
+    samples: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+    radii: tuple[float, ...] = (1e-2, 3e-3, 3e-4, 3e-5)
+    link_extent: float = 30.0
+    least_patch: float = 1e-4
+    reached: float = 1e-5
+    definite: float = 1e-3
+    straight: float = 1e-6
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name, value in vars(self).items():
+            if isinstance(value, list | tuple | np.ndarray):
+                several = tuple(checks.real(name, x, above=0) for x in value)
+                if not several or any(x <= y for x, y in pairwise(several)):
+                    checks.refuse(name, "decreasing numbers", several)
+                object.__setattr__(self, name, several)
+            else:
+                checks.real(name, value, above=0)
+        checks.real("turn", self.turn, below=math.pi / 2)
+        checks.real("first_step", self.first_step, above=self.shortest_step)
+        checks.real("longest_step", self.longest_step, least=self.first_step)
+
+    @classmethod
+    def careful(cls) -> Self:
+        """Return those with half the steps, turns and distances."""
+        usual = vars(cls())
+        kept = {"link_extent", "reached", "definite", "straight"}
+        halved = {name: np.asarray(x) / 2 for name, x in usual.items() if name not in kept}
+        return cls(**{name: x.tolist() for name, x in halved.items()})
 
 
 @dataclass(frozen=True)
@@ -38,6 +125,8 @@ class Quotient:
     equations : tuple of int
         Positions of equations with independent gradients that imply the others nearby: those that
         are solved.  Walks only watch that the others stay zero.
+    options : WalkOptions
+        Steps of walks.
     """
 
     polyhedron: Polyhedron
@@ -45,19 +134,11 @@ class Quotient:
     tolerances: Tolerances = DEFAULT
     extent: float = math.inf
     equations: tuple[int, ...] = ()
+    options: WalkOptions = WalkOptions()
 
-    @classmethod
-    def near(
-        cls,
-        polyhedron: Polyhedron,
-        symmetry: Symmetry,
-        tolerances: Tolerances,
-        extent: float,
-        points: Iterable[Array],
-    ) -> "Quotient":
+    def near(self, points: Iterable[Array]) -> "Quotient":
         """Return it with the equations that are independent near some points."""
-        equations = independent_equations(polyhedron, points)
-        return cls(polyhedron, symmetry, tolerances, extent, equations)
+        return replace(self, equations=independent_equations(self.polyhedron, points))
 
     @property
     def manifold(self) -> Manifold:

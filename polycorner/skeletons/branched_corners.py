@@ -18,7 +18,7 @@ from polycorner.polyhedra.faces import HeldPoint, projected
 from polycorner.polyhedra.quotients import EvaluatedPoint, Sample
 from polycorner.skeletons.branches import MAX_SETS, Branches
 from polycorner.skeletons.dependence import dependent_at, follow_edge
-from polycorner.skeletons.folds import DISTANCES, fold_figure
+from polycorner.skeletons.folds import fold_figure
 from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
@@ -36,8 +36,6 @@ from polycorner.spaces.manifold import Array
 ALIKE = 1e-2
 # Distances in a link at which arcs are looked for: second derivatives shrink with its radius.
 BESIDE = (0.1, 0.03, 0.01)
-# Deviation from 1 of the cosine between directions that are one.
-STRAIGHT = 1e-6
 # Times that a point of a dependent edge is moved to its distance.
 PLACED = 3
 
@@ -50,9 +48,9 @@ def dependent_rays(
 ) -> Iterator[Ray | frozenset[int]]:
     """Yield the rays of dependent edges; in place of one that is unclear, what is held."""
     branches = Branches(point, sorted(active))
-    found: list[Ray] = []
+    found, straight = list[Ray](), point.quotient.options.straight
     for y, held in branches.double():
-        if any(_contains(ray, held, branches.frame @ y) for ray in found):
+        if any(_contains(ray, held, branches.frame @ y, straight) for ray in found):
             continue
         curve = dependent_at(point, held)
         if curve is None:
@@ -131,14 +129,14 @@ def _along(there: HeldPoint, active: frozenset[int]) -> frozenset[int] | None:
     return found.difference(opened)
 
 
-def _is_same(ray: Ray, other: Ray) -> bool:
+def _is_same(ray: Ray, other: Ray, straight: float) -> bool:
     """Whether two rays, of independent gradients, belong to one edge."""
-    return ray.active == other.active and bool(ray.direction @ other.direction > 1 - STRAIGHT)
+    return ray.active == other.active and bool(ray.direction @ other.direction > 1 - straight)
 
 
-def _contains(ray: Ray, held: frozenset[int], way: Array) -> bool:
+def _contains(ray: Ray, held: frozenset[int], way: Array, straight: float) -> bool:
     """Whether a dependent edge is the only curve in a direction on which some functions vanish."""
-    return held <= ray.active and bool(ray.direction @ way > 1 - STRAIGHT)
+    return held <= ray.active and bool(ray.direction @ way > 1 - straight)
 
 
 def _known(
@@ -184,8 +182,13 @@ def with_branches(
     extreme ray of the tangent cone, but where a function of second or third order changes sign
     inside a face of the cone.  Faces beside such edges are told at their other corners only.
     """
-    found, held = branched_rays(point, active, DISTANCES[0], least=2)
-    rays = [ray for ray in found if not any(_is_same(ray, other) for other in figure.rays)]
+    options = point.quotient.options
+    found, held = branched_rays(point, active, options.distances[0], least=2)
+    rays = [
+        ray
+        for ray in found
+        if not any(_is_same(ray, other, options.straight) for other in figure.rays)
+    ]
     unclear = [_unclear(point, active, some) for some in held]
     return replace(figure, rays=(*figure.rays, *rays), notes=(*figure.notes, *unclear))
 
@@ -202,12 +205,13 @@ def branched_figure(
         return None
     if len(active) < full - 1 or comb(len(active), full - 1) > MAX_SETS:
         return None
-    near, far = (branched_rays(point, active, distance) for distance in DISTANCES[1::-1])
+    distances = point.quotient.options.distances
+    near, far = (branched_rays(point, active, distance) for distance in distances[1::-1])
     rays, unclear = far
     notes = [_unclear(point, active, held) for held in unclear]
     if Counter(ray.active for ray in near[0]) != Counter(ray.active for ray in rays):
         notes.append(f"{_unclear(point, active, frozenset())}: different ones at two distances")
-    arcs = _ArcsAround(point, rays, DISTANCES[0])
+    arcs = _ArcsAround(point, rays, distances[0])
     sectors = arcs.sectors()
     if arcs.lost:
         notes.append(

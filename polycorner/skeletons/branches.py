@@ -47,8 +47,6 @@ from polycorner.values import cached_property
 
 # Members of the pencil of two conics, of which the least degenerate one is taken.
 ANGLES = (0.3, 1.1, 1.9, 2.7)
-# Least eigenvalue of a semidefinite form relative to the largest that counts as positive.
-CLEAR = 1e-3
 # Largest number of functions with slopes that open along an edge on which a relation persists.
 OPENING = 3
 # Most sets of functions that are tried, of those in a span.
@@ -195,7 +193,8 @@ class Branches:
             if len(opened) < least:
                 continue
             values, axes = _positive(self._forms(held, some)[0])
-            if values[1] > max(self.limit, CLEAR * values[-1]) and abs(values[0]) <= self.limit:
+            least = max(self.limit, self.point.quotient.options.definite * values[-1])
+            if values[1] > least and abs(values[0]) <= self.limit:
                 for d in (axes[:, 0], -axes[:, 0]):
                     yield from self._entering(some.null_space @ d, opened, held)
 

@@ -24,8 +24,6 @@ from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
 
-# Largest eigenvalue of the form that counts as zero, relative to the next.
-FLAT = 1e-3
 # Most sets of functions with one relation that are tried.
 MAX_SETS = 100
 # Length in scale units after which a walk takes its flaps anew: they turn with the curve.
@@ -120,7 +118,8 @@ def dependent_at(point: EvaluatedPoint, active: frozenset[int]) -> tuple[HeldPoi
         form = curvature(point, related, held.relations[:, 0], held.null_space)
         values, axes = np.linalg.eigh(form)
         order = np.argsort(abs(values))
-        if len(values) < 2 or not abs(values[order[0]]) < FLAT * abs(values[order[1]]):
+        flat = quotient.options.definite
+        if len(values) < 2 or not abs(values[order[0]]) < flat * abs(values[order[1]]):
             continue
         ways = (frame @ held.null_space @ axes[:, order]).T
         curve = DependentSet(point, quotient.held(related), ways[1:])

@@ -49,15 +49,8 @@ from polycorner.skeletons.vertex_figures import Ray, VertexFigure
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
-# Distances in scale units at which the edges are looked for.
-DISTANCES = (3e-3, 1e-3, 3e-4)
-
-# Parts of these at which dependent edges are looked for as well: some of them are short.
+# Parts of the distances at which dependent edges are looked for as well: some of them are short.
 PARTS = (1.0, 0.1, 0.01)
-
-# Least eigenvalue of ``Q`` relative to the largest: at a cusp, which is known less exactly, a zero
-# one is not seen as zero.
-CLEAR = 1e-3
 
 # Functions that open along an edge, and the sign of ``t`` there.
 Opening = tuple[int, ...]
@@ -69,19 +62,19 @@ def fold_figure(
     active: frozenset[int],
     rank: int,
     full: int,
-    distances: tuple[float, ...] = DISTANCES,
+    distances: tuple[float, ...] | None = None,
 ) -> VertexFigure | None:
     """Return the rays and sectors at a fold; None where the corner is none, or not clearly.
 
     The rank is that of the active gradients in the quotient, whose dimension is ``full``; edges are
-    looked for at the given distances, in scale units.
+    looked for at the given distances, in scale units, by default those of the options.
     """
     if point.quotient.polyhedron.is_union or len(active) != rank + 1 or rank == full:
         return None
     fold = _Fold(point, sorted(active))
     if not fold.is_definite:
         return None
-    for distance in distances:
+    for distance in distances or point.quotient.options.distances:
         rays = fold.rays(distance)
         if rays is not None:
             return VertexFigure(rank, full, *fold.figure(rays, distance))
@@ -124,7 +117,9 @@ class _Fold:
         """Whether ``Q`` is positive on the flaps, and no ``S_kk`` negative if there is one flap."""
         f = len(self.flaps)
         values = np.linalg.eigvalsh(self.form[:f, :f])
-        clear = values[0] > max(self.limit, CLEAR * values[-1])
+        # At a cusp, which is known less exactly, a zero eigenvalue is not seen as zero.
+        least = self.point.quotient.options.definite * values[-1]
+        clear = values[0] > max(self.limit, least)
         return bool(clear and (f > 1 or (np.diagonal(self.cross) >= -self.limit).all()))
 
     @cached_property

@@ -32,10 +32,6 @@ from polycorner.skeletons.surfaces import Height, Surface
 from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
 
-# Step, in scale units, of the differences that carry a direction.
-STEP = 1e-4
-# Deviation from 1 of the cosine between directions that are parallel.
-PARALLEL = 1e-6
 Links = list[tuple[Tip, Array]]
 # Heights that have to agree, and that are tried.
 AGREEING = 3
@@ -45,7 +41,6 @@ FINER = 4
 NEWTON = 10
 # Parts of the way from the net to a critical point at which it must be on the face.
 WAY = np.linspace(0.1, 1.0, 10)
-FAR = 1e9
 HALVINGS = 12
 
 
@@ -73,16 +68,18 @@ def aligned(border: Border) -> Border | None:
         return border
     around = surface.embedded(np.concatenate([points for _, points, _ in edges]))
 
+    h = 100 * surface.tolerances.difference
+
     def moved(ray: tuple[frozenset[int], Array]) -> tuple[frozenset[int], Array]:
         active, (q, direction) = ray
-        ahead = q + STEP * surface.scales * direction
+        ahead = q + h * surface.scales * direction
         images = [_carried(g, np.array([q, ahead])) for g in group]
         away = [
             np.linalg.norm(surface.apart(surface.embedded(image[:1]), around), axis=1).min()
             for image in images
         ]
         start, end = images[int(np.argmin(away))]
-        return active, np.array([start, (end - start) / surface.scales / STEP])
+        return active, np.array([start, (end - start) / surface.scales / h])
 
     corners = tuple((moved(first), moved(last)) for first, last in border.corners)
     seeds = seeds_of([points for _, points, _ in edges])
@@ -118,7 +115,8 @@ def _link(surface: Surface, tip: Tip) -> Array | None:
     None where the link is not known.
     """
     if not tip.sampled:
-        opposite = len(tip.ways) == 2 and abs(tip.ways[0] @ tip.ways[1]) > 1 - PARALLEL
+        parallel = 1 - surface.quotient.options.straight
+        opposite = len(tip.ways) == 2 and abs(tip.ways[0] @ tip.ways[1]) > parallel
         return np.array(tip.ways).T if opposite else None
     radius = float(np.linalg.norm((tip.near - tip.point) / surface.scales))
     link = link_about(surface.quotient.at(tip.point), radius)
@@ -291,7 +289,8 @@ def _newton(slope: Array, curvature: Array) -> Array:
     with np.errstate(all="ignore"):
         step = -np.stack([d * slope[:, 0] - b * slope[:, 1], a * slope[:, 1] - c * slope[:, 0]], 1)
         step = step / det[:, None]
-    return np.asarray(np.clip(np.nan_to_num(step, nan=FAR), -FAR, FAR))
+    far = 1e9  # a step of this length is none
+    return np.asarray(np.clip(np.nan_to_num(step, nan=far), -far, far))
 
 
 def _distinct(surface: Surface, q: Array) -> Array:

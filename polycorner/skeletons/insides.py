@@ -44,8 +44,6 @@ Mask = NDArray[np.bool_]
 STEP, STEPS = 0.2, 60
 # Walks at a time.
 BATCH = 128
-# Smallest diagonal entry of the triangular factor of gradients that count as independent.
-INDEPENDENT = 1e-4
 # Distances of a function from zero, and of its minimum, up to which that is looked for.
 CLOSE, WITHIN = 0.35, 0.5
 # Least minimum, and its growth with the square and cube of its distance, that may be zero.
@@ -224,7 +222,8 @@ def _split(quotient: Quotient, q: Array, normals: Array) -> tuple[Array, Array, 
     r = every.shape[1]
     full, factor = np.linalg.qr(every.transpose(0, 2, 1), mode="complete")
     factor = factor[:, :r]
-    fits = abs(np.diagonal(factor, axis1=1, axis2=2)).min(axis=1, initial=1.0) > INDEPENDENT
+    least = 100 * quotient.tolerances.rank  # where Newton's method can divide by it
+    fits = abs(np.diagonal(factor, axis1=1, axis2=2)).min(axis=1, initial=1.0) > least
     factor = np.where(fits[:, None, None], factor, np.eye(r))
     return full[:, :, :r], factor, full[:, :, r:], fits
 

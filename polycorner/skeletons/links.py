@@ -27,8 +27,6 @@ from polycorner.skeletons.vertex_figures import Ray, VertexFigure, singular_rays
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 
-# Radii in scale units, of which two in succession must agree.
-RADII = (1e-2, 3e-3, 3e-4, 3e-5)
 # Random points of a link of a curve or a surface, and sets of functions to hold there.
 POINTS = 16
 MAX_SETS = 40
@@ -47,7 +45,7 @@ def singular_figure(
     if folded is not None:
         return folded
     before = None
-    for radius in RADII:
+    for radius in point.quotient.options.radii:
         notes: list[str] = []
         found = _link(search, point, active, frame, radius, notes)
         figure = VertexFigure(rank, full, *found, tuple(notes))

@@ -28,7 +28,6 @@ FIRST = 0.5
 BEFORE_BALLS = 0.5
 GROWTH = 1.5
 SHRINK = 0.7
-SHORTEST = 1e-4
 # Longest radius as a part of a circle's circumference.
 CIRCLE = 0.08
 MOST = 3000
@@ -187,7 +186,7 @@ class Net:
             before = np.logical_and.accumulate(inside, axis=2)[..., :-1]
             seen = np.concatenate([np.ones_like(before[..., :1]), before], axis=2)
             bent = (seen & ~flat).any(axis=(1, 2))
-            if (self.radii[new][bent] < SHORTEST).any():
+            if (self.radii[new][bent] < self.surface.quotient.options.least_patch).any():
                 return np.empty((1, q.shape[1])), np.full(1, np.nan)
             self.radii[new[bent]] *= SHRINK
             good = ~bent

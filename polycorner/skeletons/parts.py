@@ -18,8 +18,6 @@ from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, cached_property
 
 STEPS = 12  # of Newton's method
-SETTLED = 1e-11  # size of its last step relative to the chord
-ERROR = 1e-11  # of a length, absolute in scale units and relative
 
 
 def arc_length(quotient: Quotient, points: Array, rows: list[int]) -> float:
@@ -65,7 +63,8 @@ def _length(quotient: Quotient, points: Array, rows: Sequence[int]) -> float:
 
     moved = np.diff(points, axis=0)
     arcs = _Arcs(quotient, points[:-1][moved.any(axis=1)], moved[moved.any(axis=1)], rows)
-    length, _ = quad_vec(arcs.speed, 0.0, 1.0, epsabs=ERROR, epsrel=ERROR, quadrature="gk15")
+    error = 100 * quotient.tolerances.rounding  # absolute in scale units, and relative
+    length, _ = quad_vec(arcs.speed, 0.0, 1.0, epsabs=error, epsrel=error, quadrature="gk15")
     return float(length)
 
 
@@ -91,12 +90,12 @@ class _Arcs:
 
     def speed(self, s: float) -> float:
         """Return the sum over the arcs of the length of ``dq/ds`` orthogonal to the orbit."""
-        w = np.zeros_like(self.chords)
+        w, still = np.zeros_like(self.chords), 100 * self.quotient.tolerances.rounding * self.sizes
         for _ in range(STEPS):
             q = self.starts + self.scales * (s * self.chords + w)
             step, slope = self._solved(q)
             w = w + step
-            settled = np.linalg.norm(step, axis=1) <= SETTLED * self.sizes
+            settled = np.linalg.norm(step, axis=1) <= still
             if settled.all():
                 break
         way = np.where(settled[:, None], self.chords + slope, self.chords)

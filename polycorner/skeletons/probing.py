@@ -34,8 +34,6 @@ BISECTIONS = 24
 # Samples that a function is minimised from.
 DESCENTS = 3
 ITERATIONS = 60
-# Distance in scale units from zero that minimisation reaches, and at which a start was moved in.
-REACHED = 1e-5
 SELECTIONS = 4
 # Starts that a function met by chords gives, chords looked at for them, and how often islands are
 # sought.
@@ -134,7 +132,7 @@ def minimised(cloud: Cloud, row: int) -> tuple[float, Array | None]:
         if not near:
             continue
         distance = float(point.distances[row])
-        if abs(distance) < REACHED:
+        if abs(distance) < quotient.options.reached:
             zero = on_zero(quotient, q, frozenset([row]))
             if zero is not None:
                 return 0.0, zero.q
@@ -189,9 +187,10 @@ def on_zero(quotient: Quotient, q: Array, rows: frozenset[int]) -> EvaluatedPoin
     if not np.isfinite(point.values).all():
         return None
     distances = point.distances[: quotient.count]
-    close = {i for i in range(quotient.count) if abs(distances[i]) < REACHED}
+    reached = quotient.options.reached
+    close = {i for i in range(quotient.count) if abs(distances[i]) < reached}
     for some in (close | rows, rows, frozenset[int]()):
-        there = projected(quotient, q, point.basis(some), 100 * REACHED)
+        there = projected(quotient, q, point.basis(some), 100 * reached)
         active = None if there is None else there.active()
         if there is not None and active is not None and rows <= active:
             return quotient.at(there.q)

@@ -10,7 +10,7 @@ from polycorner import checks
 from polycorner.checks import reals
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.polyhedra.quotients import Quotient
+from polycorner.polyhedra.quotients import Quotient, WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.searches import Clock
@@ -43,6 +43,7 @@ def skeleton(
     tolerance: float = TOLERANCE,
     rank_tolerance: float = RANK_TOLERANCE,
     extent: float = EXTENT,
+    options: WalkOptions | None = None,
 ) -> Skeleton:
     """Find the corners, edges and faces of a polyhedron.
 
@@ -86,6 +87,9 @@ def skeleton(
         Singular values of the unit gradients below this fraction of the largest count as zero.
     extent : float, optional
         Length, in scale units, after which an edge counts as running to infinity.
+    options : WalkOptions, optional
+        Steps of walks, and distances at which corners are looked at.  Default ``WalkOptions()``;
+        ``WalkOptions.careful()`` where curves run closely beside each other.
 
     Returns
     -------
@@ -124,8 +128,11 @@ def skeleton(
         expected = f"a list of points, shape (k, {points.shape[-1]})"
         checks.refuse("starts", expected, points.shape)
     points = polyhedron.manifold.placed(points, "starts")
-    quotient = Quotient.near(polyhedron, symmetry or Symmetry(), tolerances, float(extent), points)
-    explorer = Explorer(quotient, points, checks.generator("rng", rng))
+    options = checks.instance("options", options or WalkOptions(), WalkOptions)
+    quotient = Quotient(
+        polyhedron, symmetry or Symmetry(), tolerances, float(extent), options=options
+    )
+    explorer = Explorer(quotient.near(points), points, checks.generator("rng", rng))
     return _run(explorer, budget, executor, progress, keep)
 
 
@@ -138,7 +145,7 @@ def resume(
     progress: Progress | None = None,
     keep: Keep | None = None,
 ) -> Skeleton:
-    """Resume a search that was interrupted or ran out of budget or time, to the same tolerances.
+    """Resume a search that was interrupted or ran out of budget or time, with the same options.
 
     Parameters
     ----------

@@ -24,7 +24,6 @@ STEPS = 60
 ASIDE = 0.2
 # Steps after which they must have halved, and size of a step at which they stop.
 PATIENCE = 6
-STILL = 1e-14
 # Functions beside those of a face that may touch it.
 NEAREST = 4
 # How much less independent gradients must be at a singular point than beside it.
@@ -100,7 +99,7 @@ def _solved(
     last: Array = np.zeros(len(q))
     mu: Array = np.zeros(0)
     sizes: Array = np.zeros(0)
-    limit = np.inf
+    limit, still = np.inf, tolerances.rounding / 10
     for k in range(STEPS):
         values, gradients, hessians = (part[held] for part in quotient.bent(q))
         if not (np.isfinite(gradients).all() and np.isfinite(hessians).all()):
@@ -126,7 +125,7 @@ def _solved(
         q = q + scales * step * (1 / (1 - ratio) if linear else 1.0)
         mu = np.asarray(mu + full[len(step) :])
         mu /= np.linalg.norm(mu)
-        if np.linalg.norm((q - start) / scales) > reach or not STILL < size <= limit:
+        if np.linalg.norm((q - start) / scales) > reach or not still < size <= limit:
             return None
         if k % PATIENCE == PATIENCE - 1:
             limit = size / 2

@@ -9,8 +9,6 @@ from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 
-# Length of walks in a link, in radii.
-EXTENT = 30.0
 # Largest dimension of a quotient in which links are sampled.
 SAMPLED = 3
 
@@ -74,4 +72,7 @@ def link_about(point: EvaluatedPoint, radius: float) -> Quotient:
     quotient, sphere = point.quotient, Link(point, radius)
     extra = range(len(point.values), quotient.count + len(sphere.equation_names))
     equations = (*quotient.equations, *extra)
-    return Quotient(sphere, Symmetry(), quotient.tolerances, EXTENT, equations)
+    options = quotient.options
+    return Quotient(
+        sphere, Symmetry(), quotient.tolerances, options.link_extent, equations, options
+    )

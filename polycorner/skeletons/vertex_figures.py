@@ -24,8 +24,6 @@ from polycorner.skeletons.sectors import Sector, active_along, sectors_between
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 
-# Distances in scale units at which edges are looked for, as far as ten tolerances; then there.
-SAMPLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 MAX_CANDIDATES = 20_000
 MAX_BASES = 64
 # Distance from zero of functions that vanish along a curve, over the size of the coordinates.
@@ -257,7 +255,8 @@ def _tested(
     kept, rows = sorted(base), np.array(sorted(active.difference(base)), dtype=np.int64)
     least = 10 * quotient.tolerances.zero
     opened = np.zeros(len(rows))  # signs of the functions farther out
-    for h in [*([h for h in SAMPLES if h > least] or [10 * least]), least]:
+    farther = [h for h in quotient.options.samples if h > least]
+    for h in [*(farther or [10 * least]), least]:
         sample = projected(quotient, point.q + h * scales * direction, kept, 0.5 * h)
         if sample is None:
             continue

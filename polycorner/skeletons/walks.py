@@ -24,20 +24,8 @@ from polycorner.skeletons.singularities import (
 )
 from polycorner.spaces.manifold import Array
 
-# Steps in scale units.
-FIRST_STEP = 0.2
-LONGEST_STEP = 0.5
-SHORTEST_STEP = 1e-7
-# Largest turn of the tangent in a step, in radians, and the deviation allowed besides that turn,
-# relative to the step.
-TURN = 0.25
-STRAY = 0.01
 # Ratio of the volumes of the held gradients at two points that lets one look for a singular point.
 COLLAPSE = 0.5
-# Part of a step within which the slope of a function bounds how far it may fall.
-NARROW = 1e-3
-# Distance in scale units of a tip from where a walk stops.
-TIP = 1e-2
 
 
 class End(Enum):
@@ -116,7 +104,7 @@ class _Follower:
         *, home: bool, extent: float | None,
     ) -> None:  # fmt: skip
         self.quotient = quotient = start.quotient
-        self.scales = quotient.scales
+        self.scales, self.options = quotient.scales, quotient.options
         self.point, self.t = start, start.tangent(direction)
         self.out, self.bend = self.t, np.zeros(len(self.t))
         self.start, self.home = start, home
@@ -133,7 +121,7 @@ class _Follower:
 
     def run(self) -> Walk:
         """Step to the first event."""
-        h = FIRST_STEP
+        h = self.options.first_step
         while True:
             taken = self._step(h)
             if isinstance(taken, End):
@@ -144,7 +132,7 @@ class _Follower:
             if met:
                 here = self.point
                 first = min(met, key=lambda e: round(part_of_way(here, point, e[0].q), 6))
-                if first[0].active() is None and h > SHORTEST_STEP and not self.union:
+                if first[0].active() is None and h > self.options.shortest_step and not self.union:
                     h /= 2  # several functions close where curves cross: on another of these
                     continue
                 self._move(*first)
@@ -168,8 +156,9 @@ class _Follower:
         manifold = self.quotient.manifold
         turning = abs(self.t * manifold.scale_array / np.array(manifold.periods)).max()
         circle = 0.05 / turning if turning > 0 else math.inf
-        far = min(room / 2, LONGEST_STEP * (1 + self.length / 20), circle)
-        return min(max(LONGEST_STEP, far), 0.8 * TURN / max(float(np.linalg.norm(self.bend)), 1e-3))
+        longest, turn = self.options.longest_step, self.options.turn
+        far = min(room / 2, longest * (1 + self.length / 20), circle)
+        return min(max(longest, far), 0.8 * turn / max(float(np.linalg.norm(self.bend)), 1e-3))
 
     def _walk(self, end: End) -> Walk:
         return Walk(np.array(self.points), self.point, self.t, end, self.length)
@@ -185,7 +174,7 @@ class _Follower:
     def _step(self, h: float) -> tuple[HeldPoint, Array, float] | End:
         """Return the next point, the tangent there and the step that was accepted."""
         blocked = False
-        while h > SHORTEST_STEP:
+        while h > self.options.shortest_step:
             ahead = self.point.q + h * self.scales * (self.t + h / 2 * self.bend)
             point = projected(self.quotient, ahead, self.point.kept, 0.3 * h)
             if point is None:
@@ -195,21 +184,21 @@ class _Follower:
                 turn = math.acos(min(1.0, float(t @ self.t)))
                 off = (point.q - self.point.q) / self.scales - h * self.t
                 # A larger deviation than the turn explains: another curve of the same functions.
-                strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + STRAY)
+                strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + self.options.stray)
                 flipped = point.orientation(t) * self.side < 0
                 if flipped and self._dependent(point) is not None:
                     return point, t, h
                 # After a short step the walk did not jump to another curve.
                 if flipped and h < self.quotient.tolerances.beside:
                     return End.SINGULAR
-                if turn < TURN and not strayed and not flipped:
+                if turn < self.options.turn and not strayed and not flipped:
                     return point, t, h
             h /= 2
         return End.CHART if blocked else End.SINGULAR
 
     def _stopped(self, end: End) -> Walk:
         """Return the walk where no step is possible: a tip where one is found within reach."""
-        tip = singular_point(self.quotient, self.point.q, self.point.kept, TIP)
+        tip = singular_point(self.quotient, self.point.q, self.point.kept, self.options.tip)
         held = set(self.point.kept).union(self.passive)
         if tip is None and end is End.CHART and (self.point.active() or held) > held:
             tip = SingularPoint(self.quotient, self.point.q, self.point.kept)  # where roots end
@@ -301,10 +290,12 @@ class _Follower:
                 at = self._between(point, s)
                 return sign * float(at.gradients[j] @ at.tangent(self.t)), at
 
+            narrow = 1e-3  # part of a step in which the slope bounds how far a function may fall
+
             def is_clear(at: HeldPoint, rate: float, part: float) -> bool:
                 fall = 2 * abs(rate) * part * self._chord(point)
                 size = zero * at.sizes[j]
-                return part < NARROW and bool(sign * at.values[j] - fall > size)
+                return part < narrow and bool(sign * at.values[j] - fall > size)
 
             far, end = sign_change(slope, enough=is_clear if self.point.is_curve else None)
             distance = sign * end.distances[j]

@@ -13,6 +13,7 @@ from polycorner.dumbbells import DumbbellPair
 from polycorner.files import load_skeleton, save_skeleton
 from polycorner.files.skeletons import KIND
 from polycorner.models import SphereCluster
+from polycorner.polyhedra import WalkOptions
 from polycorner.skeletons import Completeness
 from polycorner.skeletons.search import resume
 from polycorner.tolerances import Tolerances
@@ -39,6 +40,14 @@ def test_tolerances_are_kept_and_those_of_older_files_are_the_defaults(tmp_path)
     assert load_skeleton(path).state.quotient.tolerances == Tolerances.of(**chosen)
     rewritten(KIND, path, lambda entries: entries.pop("rank tolerance"))
     assert load_skeleton(path).state.quotient.tolerances == Tolerances.of(3e-7)
+
+
+def test_options_are_kept_and_those_of_older_files_are_the_defaults(tmp_path):
+    careful = WalkOptions.careful()
+    path = save_skeleton(skeleton(RING, [[0.0, 1.5]], options=careful), tmp_path / "ring.json")
+    assert load_skeleton(path).state.quotient.options == careful
+    rewritten(KIND, path, lambda entries: entries.pop("options"))
+    assert load_skeleton(path).state.quotient.options == WalkOptions()
 
 
 def test_relabellings_survive(tmp_path):
@@ -190,6 +199,8 @@ FAR = [1e30, 1e30]
 FORGED = [
     *[(at("tolerance"), x) for x in (-1, 0, 1e12, "nan", 10**400)],
     *[(at("rank tolerance"), x) for x in (-1, 0, 1, "nan")],
+    *[(at("options", "turn"), x) for x in (-1, 0, 2, "nan")],
+    *[(at("options", "radii"), x) for x in ([], [1e-3, 1e-2], [0.0], 1.0)],
     *[(at("extent"), x) for x in (-1, 0, "nan", 0.1)],
     *[(at("corners", 0, "point"), x) for x in (FAR, [1e300, 0.0], [1.0], 10**400)],
     *[(at("corners", 0, "active"), x) for x in ([], ["in"], ["nobody"], 7)],

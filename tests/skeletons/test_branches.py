@@ -28,7 +28,7 @@ weight = st.floats(0.3, 2.0)
 
 def corner(D, at=None):
     q = np.zeros(D.manifold.size) if at is None else np.array(at, dtype=float)
-    quotient = Quotient.near(D, Symmetry(), DEFAULT, 100.0, [q])
+    quotient = Quotient(D, Symmetry(), DEFAULT, 100.0).near([q])
     active = quotient.at(q).active()
     return SingularPoint(quotient, q, sorted(active)), active
 
@@ -130,7 +130,7 @@ def test_dependent_edges_that_are_short(length):
 def test_a_corner_that_a_walk_misses_by_the_root_of_the_tolerance():
     """Where ``a`` and ``b`` vanish and ``t`` is small, the others are of its square."""
     D = Polyhedron(FOUR, [a, b, t**2 - a, t**2 - b, c])
-    quotient = Quotient.near(D, Symmetry(), DEFAULT, 100.0, [np.zeros(4)])
+    quotient = Quotient(D, Symmetry(), DEFAULT, 100.0).near([np.zeros(4)])
     registry = Explorer(quotient, [], np.random.default_rng(0)).registry
     missed = quotient.at(np.array([2e-4, 0, 0, 0]))
     assert missed.active() == {0, 1, 4}

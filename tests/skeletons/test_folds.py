@@ -22,7 +22,7 @@ few = settings(max_examples=settings.default.max_examples // 8)
 
 def figure(D, at=None):
     q = np.zeros(D.manifold.size) if at is None else np.array(at, dtype=float)
-    point = Quotient.near(D, Symmetry(), DEFAULT, 100.0, [q]).at(q)
+    point = Quotient(D, Symmetry(), DEFAULT, 100.0).near([q]).at(q)
     explorer = Explorer(point.quotient, [], np.random.default_rng(0))
     return explorer.registry.figure(point, point.active())
 
@@ -186,7 +186,7 @@ def test_two_flaps_leave_faces_around_the_corner(monkeypatch):
     around = Counter(sector.active for sector in figure(D).sectors)
     assert Counter(sector.active for sector in found.sectors) == around
     for sector in found.sectors:
-        point = Quotient.near(D, Symmetry(), DEFAULT, 100.0, [sector.sample.q]).at(sector.sample.q)
+        point = Quotient(D, Symmetry(), DEFAULT, 100.0).near([sector.sample.q]).at(sector.sample.q)
         assert point.active() == sector.active
 
 
@@ -211,7 +211,7 @@ def test_a_dependent_edge_is_followed_around_half_a_circle(scale):
     x, y, z = space.symbols
     wall = (x**2 + y**2 - scale**2) ** 2 / scale**3 - z
     D, corner = Polyhedron(space, [y, z, wall]), [scale, 0.0, 0.0]
-    found, quotient = figure(D, corner), Quotient.near(D, Symmetry(), DEFAULT, 100.0, [])
+    found, quotient = figure(D, corner), Quotient(D, Symmetry(), DEFAULT, 100.0).near([])
     (along,) = [ray for ray in found.rays if ray.active == {1, 2}]
     walk = follow_edge(along.start(quotient), along.direction, along.active)
     assert walk.end is End.CORNER

@@ -25,7 +25,7 @@ few = settings(max_examples=settings.default.max_examples // 8)
 def across(D, at=(-1.0, -1.0, 0.0)):
     """Return what a walk along the diagonal of the floor finds."""
     start = Start(np.array(at), np.array([1.0, 1.0, 0.0]) / np.sqrt(2), (0,))
-    return list(touching_points(Quotient.near(D, Symmetry(), DEFAULT, 100.0, [start.q]), [start]))
+    return list(touching_points(Quotient(D, Symmetry(), DEFAULT, 100.0).near([start.q]), [start]))
 
 
 @given(st.floats(-0.6, 0.6), st.floats(-0.2, 0.2), st.floats(0.3, 2.0), st.floats(-0.5, 0.5))
@@ -91,7 +91,7 @@ def test_a_cluster_of_eleven_spheres_inside_faces_only():
     Without a stressed contact, points of a face come back to the cluster.
     """
     eleven, q = SphereCluster(11), packed_without_two().ravel()
-    quotient = Quotient.near(eleven.polyhedron, eleven.symmetry, DEFAULT, 100.0, [q])
+    quotient = Quotient(eleven.polyhedron, eleven.symmetry, DEFAULT, 100.0).near([q])
     point = quotient.at(q)
     active = sorted(point.active())
     gradients = point.gradients[active]

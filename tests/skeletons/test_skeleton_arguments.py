@@ -7,6 +7,7 @@ import pytest
 from skeleton_shapes import counts, half_spaces, isomorphic, polytope, space
 
 from polycorner import AllOf, Polyhedron, Symmetry, skeleton
+from polycorner.polyhedra import WalkOptions
 from polycorner.skeletons import Budget, resume, traced
 
 TRIANGLE = polytope([[-1, 0], [0, -1], [1, 1]], [0, 0, 1])
@@ -40,6 +41,8 @@ WRONG = [
     ("extent", math.nan, ValueError),
     ("extent", "far", TypeError),
     ("extent", True, TypeError),
+    ("options", 0.1, TypeError),
+    ("options", WalkOptions, TypeError),
     ("budget", 0, ValueError),
     ("budget", -3, ValueError),
     ("budget", 2.5, TypeError),

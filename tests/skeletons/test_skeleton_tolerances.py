@@ -1,12 +1,12 @@
-"""What ``tolerance`` and ``rank_tolerance`` of a search change."""
+"""What ``tolerance``, ``rank_tolerance`` and ``options`` of a search change."""
 
 import math
 
 import pytest
 from skeleton_shapes import counts, polytope
 
-from polycorner import skeleton
-from polycorner.polyhedra import LocalType
+from polycorner import Manifold, Polyhedron, skeleton
+from polycorner.polyhedra import LocalType, WalkOptions
 from polycorner.skeletons import Budget, resume
 from polycorner.tolerances import Tolerances
 
@@ -49,3 +49,39 @@ def test_a_search_goes_on_with_the_tolerances_it_began_with():
     found = resume(skeleton(D, [[0.5, angle / 4]], budget=Budget(edges=1), **chosen))
     assert found.state.quotient.tolerances == Tolerances.of(**chosen)
     assert [corner.singular for corner in found.corners if "f3" not in corner.active] == [True]
+
+
+def test_careful_walks_take_shorter_steps_to_the_same_corners():
+    plane = Manifold.euclidean("x y")
+    x, y = plane.symbols
+    D = Polyhedron(plane, {"bowl": y - x**2, "lid": 2 - y})
+    usual, careful = (
+        skeleton(D, [[0.0, 1.0]], options=options, budget=Budget(edges=1))
+        for options in (None, WalkOptions.careful())
+    )
+    usual, careful = resume(usual), resume(careful)
+    assert careful.state.quotient.options == WalkOptions.careful()
+    assert counts(usual) == counts(careful) == (2, 2, 1)
+    points = [sum(len(edge.polyline) for edge in found.edges) for found in (usual, careful)]
+    assert points[1] > 1.5 * points[0]
+    for corner, other in zip(usual.corners, careful.corners, strict=True):
+        assert corner.point == pytest.approx(other.point, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind"),
+    [
+        ("turn", 1.6, ValueError),
+        ("turn", "small", TypeError),
+        ("first_step", 0.6, ValueError),
+        ("shortest_step", 0.3, ValueError),
+        ("tip", 0.0, ValueError),
+        ("link_extent", -1, ValueError),
+        ("distances", (3e-3, 1e-3), TypeError),
+        ("radii", (), ValueError),
+        ("samples", (1e-3, 1e-2), ValueError),
+    ],
+)
+def test_options_are_checked(name, value, kind):
+    with pytest.raises(kind, match="_step" if "_step" in name else name):
+        WalkOptions(**{name: value})

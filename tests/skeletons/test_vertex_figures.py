@@ -25,7 +25,7 @@ fewest = settings(max_examples=settings.default.max_examples // 8)
 def figure(D, q, symmetry=None):
     """Return what leaves a point, with all functions that matter there."""
     point = np.asarray(q, dtype=float)
-    point = Quotient.near(D, symmetry or Symmetry(), DEFAULT, 100.0, [point]).at(point)
+    point = Quotient(D, symmetry or Symmetry(), DEFAULT, 100.0).near([point]).at(point)
     explorer = Explorer(point.quotient, [], np.random.default_rng(0))
     return explorer.registry.figure(point, point.active())
 

@@ -115,6 +115,7 @@ VALUES = {
     "Tutorial": models.Tutorial,
     "UnevenFriction": lambda: dumbbells.UnevenFriction(0.1, 5.0),
     "View": pictures.View,
+    "WalkOptions": polyhedra.WalkOptions,
     "Wobble": lambda: dumbbells.Wobble(0.01),
 }
 

@@ -15,8 +15,6 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 AXES = 3
-# Least distance of a vertex from the ends of its grid edge, as a fraction; avoids slivers.
-CLEARANCE = 1e-3
 FALSE_POSITIONS = 12
 SLAB = 200_000
 FEWEST_CELLS = 4
@@ -138,4 +136,5 @@ def crossings(
         left = np.where(moved == 1, between, left)
         right = np.where(moved == 1, right, between)
         before = moved
-    return np.clip(between, CLEARANCE, 1 - CLEARANCE)
+    clearance = 1e-3  # from the ends of the grid edge, as a fraction of it: avoids slivers
+    return np.clip(between, clearance, 1 - clearance)
