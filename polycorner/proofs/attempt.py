@@ -244,6 +244,12 @@ class Attempt:
         return any(result.status is Status.UNDECIDED for result in self.found.values())
 
     @property
+    def settled(self) -> bool:
+        """Whether the claim is proved or refuted."""
+        failed = any(result.status is Status.FAILED for result in self.found.values())
+        return failed or self.rank == PROVED
+
+    @property
     def rank(self) -> int:
         """How much is known: nothing, a point, a point of the set, a minimum."""
         if isinstance(self.enclosure, Undecided):

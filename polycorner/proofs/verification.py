@@ -33,7 +33,7 @@ It is a statement in one chart: coordinates of circles are taken as real numbers
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import fsum
@@ -50,8 +50,10 @@ from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, facts, titled, units
 from polycorner.progress import Progress, silent
 from polycorner.proofs.attempt import Attempt, Posed, attempt, bits_for, pose_claim
+from polycorner.proofs.bounded import BoundedMinimum
+from polycorner.proofs.bounded_search import bounded_minimum
 from polycorner.proofs.hypotheses import SYMMETRIC, ConditionResult, Status
-from polycorner.proofs.invariance import generators
+from polycorner.proofs.invariance import Generator, generators
 from polycorner.proofs.kkt import FIRST_BITS, Enclosure, widened
 from polycorner.proofs.parameter_boxes import (
     CELL_BITS,
@@ -74,6 +76,7 @@ DOUBLE_DIGITS = 17  # of a floating-point number, which bounds over a box of par
 SHOWN_CELLS = 5  # undecided cells listed in a table
 Bounds = tuple[Fraction, Fraction]
 MOST_DIGITS, MOST_CELLS = 10_000, 10_000_000
+LARGE = 20  # coordinates from which on faces of a corner with too many contacts are tried last
 BOX_DIGITS = 3  # digits beyond those of the enclosures, for the box that contains them
 
 
@@ -103,13 +106,17 @@ class Proof(Checked, Printed):
         all cells that are proved.
     box : mapping from str to (str, str)
         A box of coordinates and multipliers in which the KKT equations (on the section of the
-        symmetries) have exactly one solution; empty for a box of parameters.
+        symmetries) have exactly one solution; with the second statement, of coordinates within
+        which every stationary point lies in the enclosure.  Empty for a box of parameters.
     parameters : mapping from str to (float, float)
         The box of parameters, or empty.
     cells : tuple of ParameterCell
         Its parts, each proved, failed or undecided.
     region : tuple of (Fraction, Fraction)
         Exact bounds of the coordinates, without parameters.
+    minimum : BoundedMinimum or None
+        What a second statement says, where the first, that the point solves the KKT equations and
+        is a strict minimum, is not shown: see :attr:`statement`.
     """
 
     certificate: Certificate
@@ -123,6 +130,27 @@ class Proof(Checked, Printed):
     parameters: "Mapping[str, Interval]" = field(default_factory=dict)
     cells: tuple[ParameterCell, ...] = ()
     region: tuple[Bounds, ...] = field(default=(), repr=False)
+    minimum: BoundedMinimum | None = field(default=None, repr=False)
+
+    @property
+    def statement(self) -> str:
+        """What is proved if all conditions are, in words.
+
+        A *strict local minimum*, at the enclosed point; or, where contacts are more than enclosures
+        can show to close, *a local minimum in the enclosed box, with an energy between the bounds*:
+        that there is one, perhaps not only one (:mod:`polycorner.proofs.bounded`).
+        """
+        modulo = f", modulo {'; '.join(self.symmetry)}" if self.symmetry else ""
+        if self.minimum is None:
+            return f"strict local minimum{modulo}"
+        names = self.certificate.problem.polyhedron.manifold.names
+        loose = ", ".join(names[j] for j in self.minimum.rattling)
+        free = f", for all values of {loose} in their room" if loose else ""
+        if self.minimum.strict:
+            return f"strict local minimum{modulo}{free}"
+        return (
+            f"a local minimum in the enclosed box, with an energy between the bounds{modulo}{free}"
+        )
 
     @property
     def proved(self) -> bool:
@@ -206,8 +234,7 @@ class Proof(Checked, Printed):
 
     def _sheet(self) -> Sheet:
         """Return tables of the conditions and the enclosures."""
-        modulo = f", modulo {'; '.join(self.symmetry)}" if self.symmetry else ""
-        verdict = f"strict local minimum{modulo}: proved" if self.proved else "not proved"
+        verdict = f"{self.statement}: proved" if self.proved else "not proved"
         manifold = self.certificate.problem.polyhedron.manifold
         periods = dict(zip(manifold.names, manifold.periods, strict=True))
         enclosures = tuple(
@@ -253,6 +280,9 @@ def prove(
     progress: Progress = silent,
 ) -> Proof:
     """Prove in interval arithmetic that a certificate's point is a strict local minimum.
+
+    Or, at a corner with more contacts than enclosures can show to close, that there is a local
+    minimum in a tiny box; :attr:`Proof.statement` says which of both is proved.
 
     Parameters
     ----------
@@ -317,9 +347,17 @@ def prove(
     with precision(FIRST_BITS):
         formulas = Formulas(functions, d.manifold)
         check_unchanged(certificate, formulas)
+        many = not certificate.analysis.independent and problem.dimension > LARGE
+        if many and not sides:
+            found = _bounded(certificate, fields, formulas, digits)
+            if found is not None:
+                return found
         tried = attempt(certificate, fields, formulas, DOUBLE_DIGITS if sides else digits)
         if not sides:
-            return _one(certificate, tried, digits)
+            found = (
+                None if many or tried.settled else _bounded(certificate, fields, formulas, digits)
+            )
+            return found or _one(certificate, tried, digits)
         moving = Formulas(functions, d.manifold, tuple(sides))
         check_domain(moving, sides)
         posed = pose_claim(certificate, tried.face, fields, moving, values)
@@ -352,6 +390,36 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
             name: decimals(*side, digits + BOX_DIGITS, inwards=True) for name, side in box.items()
         },
         region=tuple(values[: d.manifold.size]),
+    )
+
+
+def _bounded(
+    certificate: Certificate, fields: Sequence[Generator], formulas: Formulas, digits: int
+) -> Proof | None:
+    """Return the proof of a minimum between two energies, or None."""
+    problem, tolerances = certificate.problem, certificate.tolerances
+    found = bounded_minimum(problem, formulas, certificate.point, fields, tolerances, digits)
+    if isinstance(found, Undecided):
+        return None
+    names, rows = problem.polyhedron.manifold.names, problem.polyhedron.names
+    conditions = found.conditions(names, rows)
+    region = found.region(found.radius, problem)
+    sides = dict(zip(names, region, strict=True)) | {"energy": found.energy}
+    alone = found.region(found.alone[1], problem) if found.alone else ()
+    return Proof(
+        certificate,
+        digits,
+        tuple(rows[i] for i in found.witness.supports),
+        tuple(str(gauge.field) for gauge in found.witness.gauges),
+        conditions=dict.fromkeys(conditions, Status.PROVED),
+        reasons=conditions,
+        enclosures={name: decimals(*side, digits) for name, side in sides.items()},
+        box={
+            name: decimals(*side, digits + BOX_DIGITS, inwards=True)
+            for name, side in zip(names, alone, strict=False)
+        },
+        region=region,
+        minimum=found,
     )
 
 

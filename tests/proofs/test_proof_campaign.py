@@ -88,9 +88,8 @@ def test_the_oracle_allows_a_multiplier_of_zero_where_the_form_is_positive(
     rows, flat = ((one, nil), (nil, one)), (nil, nil)
     slope = (Fraction(2), Fraction(multiplier))
     problem = Programme("weak", form, slope, rows, flat, flat, (flat,) * 3)
-    said = SimpleNamespace(
-        active=("f0", "f1"), symmetry=None, enclosures={"q1": (0, 0), "q2": (0, 0)}
-    )
+    enclosed = {"q1": (0, 0), "q2": (0, 0)}
+    said = SimpleNamespace(minimum=None, active=("f0", "f1"), symmetry=None, enclosures=enclosed)
     assert holds(problem, said) == (allowed and (true or multiplier > 0))
 
 

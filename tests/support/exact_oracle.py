@@ -4,7 +4,8 @@ Everything is decided from the definitions in rational arithmetic, in the straig
 :mod:`minima.exact_problems`; nothing here is shared with the library.
 """
 
-from itertools import product
+from itertools import combinations, product
+from types import SimpleNamespace
 
 import mpmath
 from exact_algebra import (
@@ -33,7 +34,12 @@ def holds(problem, proof):
     if beyond and not lower <= 0 <= upper:
         return _nearly_holds(problem, proof, bounds)
     # Where (u-c)_1 = 0 the terms of higher order have no derivatives up to the second.
-    return _exactly_holds(problem, slope, proof, bounds, beyond)
+    if proof.minimum is None:
+        return _exactly_holds(problem, slope, proof, bounds, beyond)
+    # A minimum in the enclosure: one that holds for some of the functions that support it.
+    parts = (c for k in range(len(proof.active) + 1) for c in combinations(proof.active, k))
+    chosen = (SimpleNamespace(active=part, symmetry=proof.symmetry) for part in parts)
+    return any(_exactly_holds(problem, slope, part, bounds, beyond) for part in chosen)
 
 
 def _exactly_holds(problem, slope, proof, bounds, beyond):

@@ -130,6 +130,7 @@ def _answer(proof: "Proof") -> dict[str, Any]:
         enclosures[f"{angle}_deg"] = list(proof.enclose(symbols[angle] * 180 / sympy.pi))
     return {
         "proved": proof.proved,
+        "statement": proof.statement,
         "proved_fraction": proof.proved_fraction,
         "conditions": {name: str(status) for name, status in proof.conditions.items()},
         "reasons": dict(proof.reasons),

@@ -1,0 +1,122 @@
+"""Minima between two energies, at corners with more contacts than balls can show to close."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from benchmarks.trials.rational_corners import MINIMA, OTHERS, corners
+from benchmarks.trials.run_corners import judged
+from polycorner import Manifold, Polyhedron, certify
+from polycorner.proofs import prove
+
+# The best packings of seven circles in the unit square: centres of six, and a circle that rattles.
+SEVEN = [
+    (0.523372890561, 0.174457630187), (0.174457630187, 0.174457630187),
+    (0.348915260374, 0.825542369813), (0.523372890561, 0.523372890561),
+    (0.174457630187, 0.523372890561), (0.7960, 0.7960), (0.825542369813, 0.348915260374),
+]  # fmt: skip
+
+
+def circles(centres):
+    """Return the packings of equal circles in the unit square, and the point of given centres."""
+    n = len(centres)
+    manifold = Manifold.euclidean(" ".join(f"x{i} y{i}" for i in range(n)) + " r")
+    *z, r = manifold.symbols
+    walls = {f"{s}low": s - r for s in z} | {f"{s}high": 1 - r - s for s in z}
+    gaps = {
+        f"gap{i}_{j}": (z[2 * i] - z[2 * j]) ** 2 + (z[2 * i + 1] - z[2 * j + 1]) ** 2 - 4 * r**2
+        for i, j in combinations(range(n), 2)
+    }
+    c = np.array(centres)
+    apart = min(np.linalg.norm(a - b) for a, b in combinations(c, 2)) / 2
+    radius = min(apart, c.min(), (1 - c).min())
+    return Polyhedron(manifold, {**walls, **gaps}), -r, np.append(c.ravel(), radius)
+
+
+def energies(proof):
+    return [sp.Rational(x) for x in proof.enclosures["energy"]]
+
+
+def test_four_circles_are_a_strict_minimum_by_exact_algebra():
+    places = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
+    proof = prove(certify(*circles(places)))
+    assert proof.proved
+    assert proof.statement == "strict local minimum"
+    assert energies(proof) == [-sp.Rational(1, 4)] * 2
+    assert len(proof.active) == 12
+
+
+def test_five_circles_have_a_minimum_within_the_digits_that_are_asked_for():
+    r = (sp.sqrt(2) - 1) / 2
+    s = float(r)
+    proof = prove(certify(*circles([(s, s), (1 - s, s), (s, 1 - s), (1 - s, 1 - s), (0.5, 0.5)])))
+    assert proof.proved
+    assert proof.statement.startswith("a local minimum in the enclosed box")
+    low, high = energies(proof)
+    assert low <= -r <= high
+    assert high - low < sp.Rational(1, 10**29)
+
+
+def test_a_circle_that_rattles_has_room():
+    polyhedron, energy, q = circles(SEVEN)
+    proof = prove(certify(polyhedron, energy, q))
+    assert proof.proved
+    assert "x5, y5" in proof.statement
+    names = polyhedron.manifold.names
+    rng = np.random.default_rng(0)
+    low, high = (np.array([float(side[k]) for side in proof.region]) for k in (0, 1))
+    assert (high - low > 0.01).nonzero()[0].tolist() == [names.index("x5"), names.index("y5")]
+    reads = [i for i, name in enumerate(polyhedron.names) if "5" in name]
+    for _ in range(200):
+        assert polyhedron.values(rng.uniform(low, high))[reads].min() > 0
+
+
+def test_translations_of_a_torus_are_factored_out():
+    # Two circles in a square torus: the best touch at a diagonal, all four images of one.
+    manifold = Manifold.euclidean("x0 y0 x1 y1 r")
+    x0, y0, x1, y1, r = manifold.symbols
+    gaps = {
+        f"gap{a}{b}": (x0 - x1 - a) ** 2 + (y0 - y1 - b) ** 2 - 4 * r**2
+        for a in (0, 1) for b in (0, 1)
+    }  # fmt: skip
+    polyhedron = Polyhedron(manifold, gaps)
+    proof = prove(certify(polyhedron, -r, [0.8, 0.7, 0.3, 0.2, 0.125**0.5]))
+    assert proof.proved
+    assert len(proof.symmetry) == 2
+    low, high = energies(proof)
+    assert low <= -1 / (2 * sp.sqrt(2)) <= high
+
+
+def test_equations_hold_at_the_inner_point():
+    # On a sphere, about the point (1, 1, 1) / sqrt(3), in a corner with one contact too many.
+    manifold = Manifold.euclidean("x y z")
+    x, y, z = manifold.symbols
+    some = {"a": x - y, "b": y - z, "both": x - z}
+    polyhedron = Polyhedron(manifold, some, {"sphere": x**2 + y**2 + z**2 - 1})
+    proof = prove(certify(polyhedron, 3 * x - y - 2 * z, [3**-0.5] * 3))
+    assert proof.proved
+    low, high = energies(proof)
+    assert low <= 0 <= high
+
+
+@pytest.mark.parametrize("kind", MINIMA)
+def test_minima_are_proved(kind):
+    found = [judged(c) for c in corners(np.random.default_rng(3), 20) if c.kind == kind]
+    assert found == ["proved"] * 2
+
+
+@pytest.mark.parametrize("kind", OTHERS)
+def test_no_other_point_is(kind):
+    found = [judged(c) for c in corners(np.random.default_rng(4), 20) if c.kind == kind]
+    assert found == ["open"] * 2
+
+
+def test_bounds_are_of_the_digits_that_are_asked_for():
+    r = (2**0.5 - 1) / 2
+    places = [(r, r), (1 - r, r), (r, 1 - r), (1 - r, 1 - r), (0.5, 0.5)]
+    certificate = certify(*circles(places))
+    narrow, wide = (energies(prove(certificate, digits=d)) for d in (60, 10))
+    assert narrow[1] - narrow[0] < sp.Rational(1, 10**58)
+    assert wide[0] <= narrow[0] <= narrow[1] <= wide[1]
