@@ -1,4 +1,4 @@
-"""The numbers that decide what counts as zero, equal, dependent or settled, in one value."""
+"""The numbers that decide what counts as zero, equal or settled, and the boxes of searches."""
 
 from dataclasses import dataclass
 
@@ -119,6 +119,60 @@ class Tolerances:
         return self.zero / TOLERANCE
 
 
+@dataclass(frozen=True)
+class SearchOptions:
+    """The boxes in which minima and corners are searched, and the steps that are tried there.
+
+    Lengths are in the scale units of the manifold.
+
+    Attributes
+    ----------
+    first_box, least_box : float
+        Box of the first step of a descent by convex models, and the box in which one has stalled.
+    least_descent : float
+        The latter for a descent in a sparse polyhedron.
+    finest_box : float
+        Least box after a step that was accepted there.
+    first_restoring : float
+        Box of the first step towards a feasible point.
+    wider, wider_linear : float
+        Next box, in units of the displacement, with a quadratic and with a linear model.
+    promised : float
+        Part of the decrease that a model promises, with which a step is accepted.
+    pushes : tuple of float
+        Lengths of steps off a saddle, or along a line that may be free, the longest first.
+    resolution : float
+        Largest side of boxes that a list leaves undecided.
+    max_boxes : int
+        Boxes after which a list is given up.
+    widest : float
+        Reach of the widest box about a point in which a list proves that it is the only one.
+    surroundings : float
+        Sides of the largest region that is tried, over those of the box that it is tried for.
+    small_box : float
+        Side of boxes in which a list seeks singular corners.
+    sharp_box : float
+        Reach of the box whose image encloses a locus.
+    """
+
+    first_box: float = 0.25
+    least_box: float = 1e-9
+    least_descent: float = 1e-10
+    finest_box: float = 1e-8
+    first_restoring: float = 0.5
+    wider: float = 4.0
+    wider_linear: float = 3.0
+    promised: float = 1e-4
+    pushes: tuple[float, ...] = (0.1, 0.01, 0.001)
+    resolution: float = 1e-6
+    max_boxes: int = 10_000_000
+    widest: float = 2.0
+    surroundings: float = 64.0
+    small_box: float = 0.05
+    sharp_box: float = 1e-9
+
+
 DEFAULT = Tolerances()
 STRICT = Tolerances.of(1e-10)
 MEASURED = Tolerances.of(1e-5)
+SEARCH = SearchOptions()

@@ -16,10 +16,9 @@ from polycorner.tolerances import DEFAULT, Tolerances
 RADII = (0.1, 1.0, 10.0, 100.0)  # of random points, in scale units
 POINTS = 16  # at each radius
 FEWEST = 8  # finite gradients of a function from which a symmetry is read
-VANISHING = 1e-150  # relative size of a derivative that is underflow
 LAST = 128.0  # distance followed, in scale units
 BENT = 0.05  # error of linear prediction, relative to the step, beyond which none is followed
-CONSTANT = 2e-14  # relative change of the energy that counts as rounding
+CONSTANT = DEFAULT.rounding / 5  # relative change of the energy that counts as rounding
 STEPS = 8  # of Newton's method
 SMALLER = 16  # steps in place of one that may have been a jump
 
@@ -83,7 +82,7 @@ def _sampled(problem: Problem, rows: tuple[int, ...]) -> tuple[Array, Array]:
         return points, problem.evaluate(points, 1)[1][:, chosen]
 
 
-def _combinations(slopes: Array) -> Array:
+def _combinations(slopes: Array, *, underflow: float = 1e-150) -> Array:
     """Return the combinations of columns ``(n, t)`` along which all slopes ``(k, m, n)`` vanish."""
     n, finite = slopes.shape[2], np.isfinite(slopes).all(axis=2)
     if (finite.sum(axis=0) < FEWEST).any():
@@ -92,7 +91,7 @@ def _combinations(slopes: Array) -> Array:
     largest = abs(found).max(axis=1)
     found = found[largest > 0] / largest[largest > 0, None]
     sizes = abs(found).max(axis=0, initial=0.0)
-    moving = sizes > VANISHING
+    moving = sizes > underflow
     basis = np.eye(n)[:, ~moving]
     if moving.any():
         scaled = found[:, moving] / sizes[moving]

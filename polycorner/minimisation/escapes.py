@@ -40,21 +40,46 @@ from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 
 STAGES, STEPS = 240, 2  # descents in growing scales, and their steps
-BEYOND = 1e30  # distance, in scale units, up to which an energy without bound is followed
-DEEP = 1e60  # a fall by so many times the energy's size at the start is taken to be without bound
 SPACED = 1.4  # ratio of successive distances of a trace
 STRAIGHT, DOUBLINGS = 2.5, 5.0  # doublings of the distance needed, with a ray to go on and without
-ACROSS = 1e-6  # Newton's step across a valley, relative to that along it
-FARTHER = 1e6  # times the distance to which the energy has to fall on along a ray
 POWER = 0.15  # exponent of d with which energies fall towards a bound
 STEADY = 1.5  # ratio up to which successive exponents are those of one power
 # Exponents q of rates t^-q, which have a sum exactly for q > 1 (Bertrand's series).
 DIVERGENT, CONVERGENT = 0.7, 1.5
-SHORTEST = 1e-18  # length at which looking ahead starts, relative to the point's size
 HALVINGS = 12
-# Ratios of successive differences of the energy: below the first they have a sum, beyond the second
-# they do not shrink.
-SHRINKING, LASTING = 0.95, 1 - 1e-6
+
+
+@dataclass(frozen=True)
+class EscapeOptions:
+    """How far a failed search is followed, and what is then read off its trace.
+
+    Attributes
+    ----------
+    beyond : float
+        Distance, in scale units, up to which an energy without bound is followed.
+    deep : float
+        A fall by so many times the energy's size at the start is taken to be without bound.
+    farther : float
+        Times the distance to which the energy has to fall on along a ray.
+    across : float
+        Newton's step across a valley, relative to that along it.
+    shortest : float
+        Length at which looking ahead starts, relative to the point's size.
+    shrinking, lasting : float
+        Ratios of successive differences of the energy: below the first they have a sum, from the
+        second on they do not shrink.
+    """
+
+    beyond: float = 1e30
+    deep: float = 1e60
+    farther: float = 1e6
+    across: float = 1e-6
+    shortest: float = 1e-18
+    shrinking: float = 0.95
+    lasting: float = 1 - 1e-6
+
+
+OPTIONS = EscapeOptions()
 
 
 # --------------------------------------------------------------- to infinity
@@ -170,8 +195,8 @@ def _trace(problem: Problem, piece: Piece, origin: Array) -> Trace:
         if (
             idle
             or status in {statuses.CONVERGED, statuses.LEVEL, statuses.UNEVEN}
-            or far > BEYOND
-            or energy < -DEEP * size
+            or far > OPTIONS.beyond
+            or energy < -OPTIONS.deep * size
         ):
             break
     level, converged = status in {statuses.LEVEL, statuses.UNEVEN}, status == statuses.CONVERGED
@@ -185,7 +210,7 @@ def _slowing(trace: Trace) -> float:
     It is nan where the trace is not long enough.
     """
     rates, t = trace.rates
-    if len(rates) < max(DOUBLINGS, len(trace.gone) - 1) or trace.gone[-1] < BEYOND:
+    if len(rates) < max(DOUBLINGS, len(trace.gone) - 1) or trace.gone[-1] < OPTIONS.beyond:
         return np.nan
     half = len(rates) // 2
     return float(-np.log(rates[-1] / rates[half]) / np.log(t[-1] / t[half]))
@@ -193,7 +218,7 @@ def _slowing(trace: Trace) -> float:
 
 def _is_without_bound(trace: Trace) -> bool:
     """Whether the energy fell far below all bounds, or falls on where a trace is long enough."""
-    return bool(trace.lowest < -DEEP * trace.size or _slowing(trace) <= DIVERGENT)
+    return bool(trace.lowest < -OPTIONS.deep * trace.size or _slowing(trace) <= DIVERGENT)
 
 
 def _is_attained_nowhere(
@@ -217,7 +242,7 @@ def _is_attained_nowhere(
     if steady and not _nears_wall(problem, piece, trace, tolerances.zero):
         return True
     far_on = _far_along(problem, piece, trace, tolerances)
-    return bool(far_on.gone[-1] > FARTHER * trace.gone[-1])
+    return bool(far_on.gone[-1] > OPTIONS.farther * trace.gone[-1])
 
 
 def _nears_wall(problem: Problem, piece: Piece, trace: Trace, closed: float) -> bool:
@@ -229,7 +254,7 @@ def _nears_wall(problem: Problem, piece: Piece, trace: Trace, closed: float) -> 
     )
     closing = -np.diff(away, axis=0) / np.diff(np.log(trace.gone[-3:]))[:, None]
     gaps = away[1] > closed
-    return bool((gaps & (closing[1] > ACROSS * away[1]) & (closing[1] > closing[0])).any())
+    return bool((gaps & (closing[1] > OPTIONS.across * away[1]) & (closing[1] > closing[0])).any())
 
 
 def _far_along(problem: Problem, piece: Piece, trace: Trace, tolerances: Tolerances) -> Trace:
@@ -242,7 +267,7 @@ def _far_along(problem: Problem, piece: Piece, trace: Trace, tolerances: Toleran
     length = float(abs(step / problem.scales).max())
     if not length > 0:
         return trace
-    ahead = 2.0 ** np.arange(np.log2(4 * BEYOND / length))
+    ahead = 2.0 ** np.arange(np.log2(4 * OPTIONS.beyond / length))
     points = last + ahead[:, None] * step
     values, gradients = problem.evaluate(points, 1)
     curved = float(abs(problem.evaluate(last, 2)[2][-1]).max())
@@ -274,7 +299,7 @@ def _straight_on(problem: Problem, piece: Piece, q: Array, step: Array, closed: 
     away = distances(values[:-1], gradients[:-1])
     held = [*(i for i in sorted(piece) if away[i] <= closed), *range(m, len(values) - 1)]
     curvatures, vectors = np.linalg.eigh(hessians[-1])
-    short = abs(gradients[-1] @ vectors) <= ACROSS * np.linalg.norm(u) * curvatures
+    short = abs(gradients[-1] @ vectors) <= OPTIONS.across * np.linalg.norm(u) * curvatures
     basis = null_space(np.vstack([gradients[held], vectors.T[short]]), 1e-8)
     return np.asarray(basis @ (basis.T @ u) * problem.scales)
 
@@ -339,7 +364,8 @@ def _ahead(
     """Return the edge that lies shortly ahead, if the energy decreases all the way."""
     step = way * problem.scales
     size = max(1.0, float(abs(q / problem.scales).max()))
-    ahead = size * SHORTEST * 2.0 ** np.arange(np.log2(tolerances.corner / SHORTEST))
+    shortest = OPTIONS.shortest
+    ahead = size * shortest * 2.0 ** np.arange(np.log2(tolerances.corner / shortest))
     level = float(problem.energy.value(q))
     beyond = _is_beyond(problem, rows, q + ahead[:, None] * step, level)
     if not beyond.any():
@@ -422,12 +448,12 @@ def _approach(problem: Problem, edge: Array, step: Array, far: float) -> tuple[s
     if not np.isfinite(falls).all() or not (falls[-4:] > 0).all():
         return here, True
     ratio = float((falls[-3:] / falls[-4:-1]).mean())
-    if ratio >= LASTING:
+    if ratio >= OPTIONS.lasting:
         return (
             "towards it the energy falls without bound, by no less each time that the distance is "
             "halved"
         ), False
-    if ratio >= SHRINKING:
+    if ratio >= OPTIONS.shrinking:
         return f"{here}, and whether it has a limit is not seen", False
     limit = float(energies[-1] - falls[-1] * ratio / (1 - ratio))
     return f"the energy decreases towards it and tends to about {number(limit, 4)}", True

@@ -26,8 +26,6 @@ from polycorner.printing import angle_unit, number
 from polycorner.spaces.manifold import Array
 
 DIGITS = 6
-VANISHING = 1e-3  # slope, relative to that of the parabola, at which a value counts as stationary
-SEEN = 1e-6  # smallest component of a unit direction that is shown
 
 
 def explanation(
@@ -107,8 +105,11 @@ def _position(a: Analysis, stratum: Stratum, unit: str | None) -> str:
     return f"It lies in the polyhedron, on a face of dimension {dimension}; {active}."
 
 
-def _missed(a: Analysis, unit: str | None) -> str:
-    """Name the most violated constraint and the size of its violation."""
+def _missed(a: Analysis, unit: str | None, *, flat: float = 1e-3) -> str:
+    """Name the most violated constraint and the size of its violation.
+
+    Its value counts as stationary up to a slope of ``flat`` times that of the parabola.
+    """
     d, local = a.local.problem.polyhedron, a.local
     away = distances(local.values[:-1], local.gradients[:-1])
     m = a.local.problem.inequalities
@@ -123,7 +124,7 @@ def _missed(a: Analysis, unit: str | None) -> str:
         worst = int(np.flatnonzero(away[:m] == short)[0])
         violated = f"the inequality {d.names[worst]}"
     slope, bend = abs(local.gradients[worst]).max(), abs(local.hessians[worst]).max()
-    vanishing = slope <= VANISHING * np.sqrt(abs(local.values[worst]) * bend)
+    vanishing = slope <= flat * np.sqrt(abs(local.values[worst]) * bend)
     size = (
         "and its gradient vanishes there: no small step changes it to first order"
         if vanishing
@@ -354,12 +355,12 @@ def _with(value: float, unit: str | None) -> str:
     return f"{number(value, DIGITS)} {unit or ''}".rstrip()
 
 
-def _direction(a: Analysis, direction: Array) -> str:
-    """Return a direction of length one in scaled coordinates, in the coordinates themselves."""
+def _direction(a: Analysis, direction: Array, *, least: float = 1e-6) -> str:
+    """Return the components of a unit direction that can be seen, in the coordinates themselves."""
     manifold = a.local.problem.polyhedron.manifold
     words = []
     rows = zip(manifold.names, manifold.periods, manifold.scales, direction, strict=True)
     for name, period, scale, x in rows:
-        if abs(x) > SEEN:
+        if abs(x) > least:
             words.append(f"d{name} = {number(scale * x, DIGITS)} {angle_unit(period)}".rstrip())
     return f"({', '.join(words)})"

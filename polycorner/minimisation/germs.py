@@ -21,10 +21,9 @@ from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
 ROUNDING = 1e3  # propagated rounding errors below which a coefficient counts as zero
-CLEAR = 1e6  # and above which it counts as different from zero
+CLEAR = 1e3 * ROUNDING  # and above which it counts as different from zero
 POINT = 4 * EPSILON  # relative rounding of a point's coordinates
 MOVE = 0.01  # distance in scale units by which a degenerate point may be missed: searches are slow
-REGULAR = 1e12  # condition of the linear system up to which it is regular
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +168,7 @@ class _System(Value):
         gradients = problem.evaluate(q, 1)[1][list(face.rows)]
         matrix = bordered_system(hessian, gradients, held, across)
         size = abs(matrix).max(axis=1, initial=0.0)
-        if not (size > 0).all() or np.linalg.cond(matrix / size[:, None]) > REGULAR:
+        if not (size > 0).all() or np.linalg.cond(matrix / size[:, None]) > CLEAR**2:
             return None
         inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
         return cls(problem, q, face, across, inverse, float(abs(matrix).max()))

@@ -35,10 +35,9 @@ from polycorner.polyhedra.cones import Rows, linear_programme, null_space
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import TOLERANCE, Tolerances
+from polycorner.tolerances import SEARCH, TOLERANCE, Tolerances
 from polycorner.values import Checked
 
-LINE = (1e-3, 1e-2, 1e-1)  # where points of a line are compared, in scale units
 JUMP = 1e-2  # change of a scaled second derivative that counts as one
 
 
@@ -154,7 +153,7 @@ def _of_pieces(
 
     def slides(v: Array) -> bool:
         """Whether no function falls along a line, up to rounding."""
-        along = np.array(LINE)[:, None] * v * scales
+        along = np.array(SEARCH.pushes)[:, None] * v * scales
         points = polyhedron.manifold.placed(polyhedron.manifold.moved(q, along))
         away = (polyhedron.bundle.evaluate(points, 0)[0] - missed) / lengths[:, 0]
         inside, off = away[:, :count], abs(away[:, count : count + len(polyhedron.stated)])

@@ -14,8 +14,7 @@ from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import LEAVES, Graph
 from polycorner.minimisation.series import Ring, ring
 from polycorner.spaces.manifold import Array
-
-KINK = 1e-6  # relative difference of two compared numbers below which a branch point is near
+from polycorner.tolerances import DEFAULT
 
 
 class NotAnalyticError(ArithmeticError):
@@ -203,7 +202,8 @@ def _angle(domain: Ring, y: Array, x: Array) -> Array:
 def _comparison(holds: Callable[[float, float], bool]) -> _Rule:
     def rule(domain: Ring, a: Array, b: Array) -> Array:
         u, v = float(a[0, 0]), float(b[0, 0])
-        if abs(u - v) <= KINK * max(1.0, abs(u), abs(v)):
+        # A branch point is near: a series on one side of it says nothing about the other.
+        if abs(u - v) <= DEFAULT.same * max(1.0, abs(u), abs(v)):
             raise ZeroDivisionError
         return domain.constant(float(holds(u, v)))
 

@@ -33,7 +33,6 @@ STRIDE = 0.5  # longest step of a walk, in scale units
 STEPS = 200  # of a walk, at most
 PARTS = (1.0, 0.5, 0.25, 0.1, 0.02)  # fractions of a step, tried in turn
 GAIN = 0.1  # fraction of its length by which a step must approach its goal
-LEAST = 1e-3  # fraction of the distance from its goal by which a step should reduce it
 BESIDE = 0.1  # distance of the second point at which a symmetry is checked, in scale units
 NET = 0.5  # distance between the points kept of a locus, in scale units
 PAIRS = 3  # nearest pairs of points tried to connect two loci
@@ -113,9 +112,12 @@ class Paths(Quotient):
             p = reached
         return False
 
-    def _towards(self, p: Array, miss: Array, slack: float) -> tuple[Array, Piece] | None:
+    def _towards(
+        self, p: Array, miss: Array, slack: float, *, least: float = 1e-3
+    ) -> tuple[Array, Piece] | None:
         """Return the step along flat directions that best reduces ``miss``, and what is active.
 
+        One that does not reduce it by the fraction ``least`` leads nowhere.
         Near a crossing of loci all curvatures are small: up to ``slack`` they are flat.
         """
         analysis = analyse(self.problem, p, self.tolerances, higher="none")
@@ -127,7 +129,7 @@ class Paths(Quotient):
         moves = 1e-5 * flat.T * self.scales
         slopes = [(self.place(p + v) - self.place(p - v)) / 2e-5 for v in moves]
         weights = np.linalg.lstsq(np.array(slopes).T, miss, rcond=1e-6)[0]
-        if np.linalg.norm(miss - weights @ slopes) > (1 - LEAST) * np.linalg.norm(miss):
+        if np.linalg.norm(miss - weights @ slopes) > (1 - least) * np.linalg.norm(miss):
             return None
         step = flat @ weights
         step = step * min(1.0, STRIDE / max(abs(step).max(), 1e-300))

@@ -28,7 +28,6 @@ from polycorner.minimisation.descent import statuses
 from polycorner.minimisation.escapes import Escape, domain_edge, escape
 from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.findings import steepest_descent
-from polycorner.minimisation.neighbourhood import STEPS
 from polycorner.minimisation.polishing import Endpoint, slsqp
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.sparse.descent import descend
@@ -40,16 +39,16 @@ from polycorner.polyhedra.polyhedron import MAX_SELECTIONS, Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
 from polycorner.printing import number
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
+from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, SEARCH, TOLERANCE, Tolerances
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
 
 CONTACTS = 50  # from which a descent goes on
-NEARLY = 1e-3  # singular value of unit gradients, relative to the largest, to be looked at
+NEARLY = 1000 * DEFAULT.rank  # singular value of unit gradients that is to be looked at
 FARTHEST = 1e3  # longest step of Newton's method towards a chosen face, in scale units
 End = tuple[int, int, Array, Array]  # status, iterations, point, multipliers
-FLAT = 1e-14  # diagonal entry, relative to the largest, below which a coordinate is flat
+FLAT = DEFAULT.rounding / 10  # relative diagonal entry below which a coordinate is flat
 UNEVEN = 1e3  # ratio of estimated scales, in the manifold's, for which a flat end is doubted
 PATIENCE = 100  # a lower limit on the steps is meant to cut the descent short
 Method = Literal["newton", "slsqp", "scp"]
@@ -487,7 +486,7 @@ def _lower_point(
     if found.verdict is not Verdict.NOT_STATIONARY or found.independent:
         return None
     rate, way = steepest_descent(found)
-    for step in STEPS:
+    for step in SEARCH.pushes:
         reached, point = problem.restore(piece, end.point + step * way * problem.scales)
         if reached and problem.energy.value(point) < values[-1] - rate * step / 4:
             return point

@@ -17,9 +17,8 @@ from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import Tolerances
+from polycorner.tolerances import SEARCH, Tolerances
 
-FIRST_RADIUS, LEAST_RADIUS = 0.25, 1e-9  # of the trust region, in scale units
 PENALTY = 10.0  # initial weight of the constraint violation in the merit function
 
 
@@ -100,7 +99,7 @@ def sequential_convex(
     values, gradients, hessians = problem.evaluate(q, 2)
     size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
     duals = np.zeros(count)
-    penalty, radius, idle = PENALTY, FIRST_RADIUS, 0
+    penalty, radius, idle = PENALTY, SEARCH.first_box, 0
     for iteration in range(1, limit + 1):
         lengths = np.linalg.norm(gradients[kept], axis=1)
         lengths[lengths == 0] = 1.0
@@ -130,7 +129,7 @@ def sequential_convex(
                 return q, iteration, True
         else:
             radius = 0.25 * min(radius, reach)
-        if radius < LEAST_RADIUS:
+        if radius < SEARCH.least_box:
             return q, iteration, True
     return q, limit, False
 

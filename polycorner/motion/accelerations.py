@@ -20,8 +20,7 @@ from polycorner.values import Checked
 
 MOST_MODES = 4096  # that are examined
 SOLVED, UNBOUNDED = 0, 3  # of linear programmes
-TURN = 1e-3  # scaled displacement over which the turn of slips is differentiated
-FAR = 1e12  # distance from which the projection onto a set is the force that opposes most
+FAR = 1e4 * DEFAULT.unbounded  # whose projection onto a set is the force that opposes most
 
 
 class Consistency(Enum):
@@ -288,13 +287,16 @@ class _Problem:
         return bool(square[0] > DEFAULT.same**2 * max(square[1:]))
 
 
-def _turns(system: System, state: State) -> Array:
-    """Return the rates of the slips at constant velocity, by differences of the fourth order."""
+def _turns(system: System, state: State, *, turn: float = 1e-3) -> Array:
+    """Return the rates of the slips at constant velocity, by differences of the fourth order.
+
+    They are taken over a scaled displacement ``turn``.
+    """
     q, v, law = state.q, state.v, system.formulation
     speed = np.abs(v / system.manifold.scale_array).max(initial=0.0)
     if not (system.friction and speed > 0):
         return np.zeros(law.slips)
-    h = TURN / speed
+    h = turn / speed
     at = [np.concatenate([q + k * h * v, v]) for k in (-2, -1, 1, 2)]
     slips, _ = law.slip_velocities(system.parameters, np.array(at))
     return np.asarray((slips[0] - 8 * slips[1] + 8 * slips[2] - slips[3]) / (12 * h))

@@ -14,7 +14,6 @@ from polycorner.spaces.manifold import Array
 if TYPE_CHECKING:
     import sympy
 
-FINEST = 1e-4  # least correlation length of a periodic field, as a part of its period
 TAIL = 9.0  # standard deviations of the wave numbers that are drawn
 
 
@@ -137,18 +136,24 @@ def signal_modes(band: Any, modes: int, rng: np.random.Generator) -> tuple[Array
 
 
 def field_modes(
-    correlation_length: float, circumference: float, modes: int, rng: np.random.Generator
+    correlation_length: float,
+    circumference: float,
+    modes: int,
+    rng: np.random.Generator,
+    *,
+    finest: float = 1e-4,
 ) -> tuple[Array, Array, Array]:
     """Return wave numbers across and along, and phases, of a field with Gaussian covariance.
 
-    Those across are whole numbers, of waves in a circumference, if that is finite.
+    Those across are whole numbers, of waves in a circumference, if that is finite; the correlation
+    length then is at least the part ``finest`` of it.
     """
     real("circumference", circumference, above=0, infinite=True)
     periodic = math.isfinite(circumference)
     length = real("correlation_length", correlation_length, above=0)
     if periodic:
-        finest = FINEST * circumference
-        real("correlation_length", length, least=finest, unit="the unit of circumference")
+        least = finest * circumference
+        real("correlation_length", length, least=least, unit="the unit of circumference")
     first, second = (_stratified(modes, rng) for _ in range(2))
     along = _normal(second) / length
     if not periodic:

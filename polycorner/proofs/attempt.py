@@ -44,7 +44,6 @@ MOST_DOUBLINGS = 3  # of the precision, until every condition is decided
 MOST_SINGULAR = 1  # of the precision, where the equations seem to be singular
 PROVED = 3  # the rank of an attempt at which nothing is left open
 FAR = f"{SUBJECT} near the point"
-LEAST_SIZE = 1e-10  # size in units below which digits are relative to the unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,12 +384,15 @@ def _distance(certificate: Certificate, z: "list[Ball]") -> float:
     return max(abs(float(x) - float(q)) / float(s) for x, q, s in pairs)
 
 
-def _sharp(enclosure: Enclosure, digits: int) -> bool:
-    """Whether every unknown is enclosed to ``digits`` digits, relative to itself or its unit."""
+def _sharp(enclosure: Enclosure, digits: int, *, least: float = 1e-10) -> bool:
+    """Whether every unknown is enclosed to ``digits`` digits, relative to itself.
+
+    Where it is smaller than ``least`` units, they are relative to its unit.
+    """
     units = enclosure.predictor.system.units
     small = ball(10) ** -digits
     return all(
-        x.rad() <= small * (x.abs_lower() + LEAST_SIZE * unit)
+        x.rad() <= small * (x.abs_lower() + least * unit)
         for x, unit in zip(enclosure.solution, units, strict=True)
     )
 

@@ -16,11 +16,9 @@ from polycorner.formulas.rows import Indices, Mask, SparseRows
 from polycorner.minimisation.sparse.faces import FacePoint, on_corner
 from polycorner.minimisation.sparse.programmes import Linearised, step
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import DEFAULT
+from polycorner.tolerances import DEFAULT, SEARCH
 
 CLOSE = 0.05  # largest displacement, in scale units, from which on the corner is solved for
-WIDER = 3.0  # next box, in units of the largest displacement of this step
-LEAST = 1e-9  # box, in scale units, below which the chain has stalled
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def descend(
         nothing = np.empty(0), csr_array((0, len(q)))
         at = Linearised(values, jacobian, *nothing, land.gradient)
         found = step(at, np.full(len(q), reach))
-        if found is None or reach < LEAST:
+        if found is None or reach < SEARCH.least_box:
             return ChainEnd(q, held, lam, count, None)
         strong = found.multipliers > DEFAULT.multiplier * found.multipliers.max(initial=0.0)
         held, lam = rows.chosen(np.flatnonzero(strong)), found.multipliers[strong]
@@ -108,7 +106,7 @@ def descend(
             corner = solve_corner(land, held, q)
             if corner is not None and _settled(land, corner):
                 return ChainEnd(corner.point, held, corner.multipliers, count, corner)
-        reach = min(widest, WIDER * size)
+        reach = min(widest, SEARCH.wider_linear * size)
     return ChainEnd(q, held, lam, limit, None)
 
 

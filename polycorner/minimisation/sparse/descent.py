@@ -41,18 +41,14 @@ from polycorner.minimisation.sparse.restoration import (
 )
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import Tolerances
+from polycorner.tolerances import SEARCH, Tolerances
 
-FIRST, LEAST = 0.25, 1e-10  # box of the first step, and of the last, in scale units
-WIDER, FINEST = 4.0, 1e-8  # next box, in units of the displacement; the least one after a success
 THICK = 0.5  # depth, in scale units, of a wall that no step crosses
 SAMPLES = 64  # of a step, at most
 FACTORS = (1.0, 0.5, 0.25, 0.125)  # parts of a step that are tried before the box shrinks
-PROMISED = 1e-4  # part of the decrease that the model promises, with which a step is accepted
 CLOSE = 0.5  # step from which on Newton's method on the face is tried
 CORRECTIONS = 20  # of the face on which Newton's method is tried
 IDLE = 5  # steps without any promise after which a descent has stalled
-PUSHES = (0.1, 0.01, 0.001)  # lengths of steps off a saddle, in scale units
 
 
 @dataclass(frozen=True)
@@ -85,7 +81,7 @@ class _Descent:
     """The state of a descent: a feasible point, the box of the next step, the last multipliers."""
 
     def __init__(self, problem: Nonlinear, at: Point) -> None:
-        self.problem, self.at, self.origin, self.reach = problem, at, at.place, FIRST
+        self.problem, self.at, self.origin, self.reach = problem, at, at.place, SEARCH.first_box
         self.multipliers = np.zeros(len(at.distances))
         self.tried: tuple[Indices, float] | None = None
         self.idle = 0
@@ -129,18 +125,19 @@ class _Descent:
             trial = self.trial(factor * d, held)
             if (
                 trial is not None
-                and trial.energy <= at.energy - PROMISED * factor * promised + noise
+                and trial.energy <= at.energy - SEARCH.promised * factor * promised + noise
             ):
                 self.at = trial
                 whole = factor == 1.0 and moved > 0.9 * self.reach
-                self.reach = 2 * self.reach if whole else max(WIDER * factor * moved, FINEST)
+                next_box = max(SEARCH.wider * factor * moved, SEARCH.finest_box)
+                self.reach = 2 * self.reach if whole else next_box
                 return None
         return self.shrunk(FACTORS[-1] * moved)
 
     def shrunk(self, reach: float) -> tuple[Array, Verdict | None] | None:
         """Make the box smaller; return the end where it has become too small."""
         self.reach = 0.5 * min(self.reach, reach)
-        return (self.at.place, Verdict.NOT_CONVERGED) if self.reach < LEAST else None
+        return (self.at.place, Verdict.NOT_CONVERGED) if self.reach < SEARCH.least_descent else None
 
     def is_worth_trying(self, held: Indices, moved: float) -> bool:
         """Whether Newton's method on a face may succeed: it is new, or much nearer than before."""
@@ -234,7 +231,7 @@ class _Descent:
         if second_order(hessian, rows, tolerances.flat * size) is Verdict.SADDLE:
             lower = self.beyond(at, held, downward(hessian, rows))
             if lower is not None:
-                self.at, self.reach, self.tried = lower, FIRST, None
+                self.at, self.reach, self.tried = lower, SEARCH.first_box, None
                 self.multipliers = lam
                 return None
         return at.place, None
@@ -245,7 +242,7 @@ class _Descent:
             return None
         way = way / abs(way).max()
         noise = 1e-14 * (abs(at.energy) + float(abs(at.gradient).max()))
-        for push in PUSHES:
+        for push in SEARCH.pushes:
             for sign in (1.0, -1.0):
                 ahead = self.problem.at(at.place + sign * push * way)
                 found = projected(self.problem, ahead, 10, held, onto=True)

@@ -10,7 +10,6 @@ from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
 REFINEMENTS = 3  # steps of iterative refinement
-REGULAR = 1e-10  # regularisation of a symmetric system, relative to its largest entry
 MOST_REFINEMENTS = 20  # of a regularised system
 
 
@@ -104,7 +103,8 @@ def least_squares(rows: csr_array, gradient: Array) -> Array | None:
 class Saddle:
     """The symmetric system ``[[H, A^T], [A, 0]]``, of any rank, by a factorisation nearby.
 
-    SuperLU factorises ``[[H + r, A^T], [A, -r]]`` for a small ``r``, and refinement with the system
+    SuperLU factorises ``[[H + r, A^T], [A, -r]]`` for an ``r`` that is the part ``relative`` of the
+    largest entry, and refinement with the system
     itself removes what ``r`` changes ([NW] sec. 19.3, the proximal method of multipliers).  In the
     null space of the system the solution stays as it was at the start: dependent rows and
     directions without curvature do no harm, if there is a solution.
@@ -115,11 +115,11 @@ class Saddle:
         If the factorisation is singular all the same, or not finite.
     """
 
-    def __init__(self, hessian: Any, rows: csr_array) -> None:
+    def __init__(self, hessian: Any, rows: csr_array, *, relative: float = 1e-10) -> None:
         k, n = rows.shape
         self.size = n
         self.matrix = csc_array(block_array([[hessian, rows.T], [rows, csr_array((k, k))]]))
-        shift = REGULAR * max(1.0, float(abs(self.matrix).max()))
+        shift = relative * max(1.0, float(abs(self.matrix).max()))
         shifts = np.concatenate([np.full(n, shift), np.full(k, -shift)])
         found = factorised(self.matrix + diags_array(shifts))
         if found is None:

@@ -18,7 +18,6 @@ from polycorner.minimisation.verdicts import Verdict
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 
-INWARD = 1e-3  # rate, per step of a scale unit, at which a direction leads inward
 PENALTY = 1e4  # of directions that leave the face, in units of the largest curvature
 
 
@@ -106,9 +105,14 @@ def multiplier_ranges(
     return ends
 
 
-def leads_down(rows: csr_array, inequalities: int, gradient: Array) -> bool:
-    """Whether a direction leads into the polyhedron and lowers the energy to first order."""
-    empty = np.full(inequalities, -INWARD), rows[:inequalities]
+def leads_down(
+    rows: csr_array, inequalities: int, gradient: Array, *, inward: float = 1e-3
+) -> bool:
+    """Whether a direction leads into the polyhedron and lowers the energy to first order.
+
+    Inward is what the functions grow by per scale unit, at least.
+    """
+    empty = np.full(inequalities, -inward), rows[:inequalities]
     sections = np.zeros(rows.shape[0] - inequalities), rows[inequalities:]
     at = Linearised(*empty, *sections, gradient)
     found = step(at, np.ones(len(gradient)))

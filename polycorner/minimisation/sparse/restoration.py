@@ -10,8 +10,8 @@ from polycorner.minimisation.sparse.factorisation import Saddle
 from polycorner.minimisation.sparse.nonlinear import Nonlinear, Point
 from polycorner.minimisation.sparse.programmes import Linearised, elastic_step, quadratic_step
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import SEARCH
 
-FIRST, LEAST = 0.5, 1e-9  # box of a step, in scale units
 AROUND = 100.0  # box of a step on a flat face, in units of the violation
 FARTHEST = 10.0  # violation, in scale units, beyond which a projection is given up
 NONE = np.empty(0, dtype=np.int64)
@@ -97,7 +97,7 @@ def projected(
 
 def restored(problem: Nonlinear, at: Point, limit: int) -> Restored:
     """Lower the sum of violations by elastic programmes in a trust region until it vanishes."""
-    reach, miss = FIRST, problem.tolerances.zero
+    reach, miss = SEARCH.first_restoring, problem.tolerances.zero
     total = float(violation(problem, at).sum())
     for _ in range(limit):
         if worst(problem, at) < 1e-3:
@@ -122,7 +122,7 @@ def restored(problem: Nonlinear, at: Point, limit: int) -> Restored:
             reach = 2 * reach if size > 0.9 * reach else reach
         else:
             reach = 0.25 * min(reach, size)
-        if reach < LEAST:
+        if reach < SEARCH.least_box:
             break
     return Restored(at, feasible=worst(problem, at) <= miss)
 

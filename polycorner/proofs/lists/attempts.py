@@ -23,22 +23,19 @@ from polycorner.proofs.lists.faces import (
     MOST_WIDENING,
     QUARTERINGS,
     WIDENINGS,
-    WIDEST,
 )
 from polycorner.proofs.lists.known import Setting, Tried
 from polycorner.proofs.lists.loci import locus, met
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import DEFAULT
+from polycorner.tolerances import DEFAULT, SEARCH
 
 MOST_STEPS = 20
 STRIDE = 0.5  # longest step in scale units
-RELEVANT = 1e-6  # share of the largest force at which a function counts as active
 Sides = tuple[Array, Array]
 SURE = 0.8  # of the unknowns' radii, below which those of the image are small enough
 Mapped: TypeAlias = Callable[..., Iterable[Any]]
 PART = 512  # starts that Newton's method goes on from at a time, at most
 ATTEMPTS = 1024  # candidates that are tried in one round
-WIDER = 64.0  # sides of the largest region that is tried, over those of the box it is tried for
 EVERY = 2  # bisections of every coordinate between two attempts at a box
 LOCUS = (-1,)  # in place of the functions of a face
 MANY = 48  # candidates for which it is worth compiling second derivatives
@@ -183,7 +180,7 @@ def newton(
     return q, found & ((lam > 0) | faces.filled)[:, :most].all(axis=1)
 
 
-def active_sets(weights: Array, pulls: Array) -> Mask:
+def active_sets(weights: Array, pulls: Array, *, relevant: float = 1e-6) -> Mask:
     """Return the functions ``(B, m)`` that balance the energy in nearest combinations.
 
     Parameters
@@ -192,11 +189,13 @@ def active_sets(weights: Array, pulls: Array) -> Mask:
         Weights of the gradients, the energy's last.
     pulls : (B, m + 1) array
         Lengths of the gradients.
+    relevant : float, optional
+        Share of the largest force at which a function counts.
     """
     forces = weights * pulls
     most = forces.max(axis=1, keepdims=True, initial=0.0)
     with np.errstate(invalid="ignore"):
-        return np.asarray((forces[:, :-1] > RELEVANT * most) & (most > 0))
+        return np.asarray((forces[:, :-1] > relevant * most) & (most > 0))
 
 
 @dataclass
@@ -232,7 +231,7 @@ class Screen:
         found = np.full((len(self.q), len(self.free)), np.nan)
         left = np.arange(len(self.q))
         for power in range(QUARTERINGS):
-            reach = np.minimum(widest[left], WIDEST)[:, None] / 4**power * scales
+            reach = np.minimum(widest[left], SEARCH.widest)[:, None] / 4**power * scales
             found[left] = self._widened(left, reach)
             left = left[np.isnan(found[left]).any(axis=1)]
             if not left.size:
@@ -386,7 +385,7 @@ class Attempts:
         still = np.zeros(len(ripe), dtype=np.bool_)
         if self.setting.may_have_loci:
             still = ((e.rest.low[ripe, -1] <= 0) & (e.rest.high[ripe, -1] >= 0)).all(axis=1)
-        return Starts(boxes.middles, active, WIDER * widths.max(axis=1), still)
+        return Starts(boxes.middles, active, SEARCH.surroundings * widths.max(axis=1), still)
 
     def run(self, starts: Starts, mapped: Mapped = map) -> None:
         """Try to find loci and regions from some points, for parameters in their middles."""
@@ -415,11 +414,11 @@ class Attempts:
         inside = np.zeros((len(starts), setting.problem.inequalities), dtype=np.bool_)
         points, found = newton(setting.problem, starts, inside, z)
         for q in points[found]:
-            if known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, WIDEST):
+            if known.has_value(q[list(z)]) or self.failed.has(LOCUS, q, SEARCH.widest):
                 continue
             place = locus(setting.faces.formulas, z, q, setting.problem.scales, setting.domain.held)
             if place is None:
-                self.failed.add(LOCUS, q, WIDEST)
+                self.failed.add(LOCUS, q, SEARCH.widest)
             elif not known.has_locus(place):
                 shown = met(place, setting.functions, setting.conj, setting.domain)
                 (known.missed if shown is None else known.loci).append(shown or place)

@@ -12,7 +12,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from polycorner.proofs.lists.attempts import WIDER, Mapped
+from polycorner.proofs.lists.attempts import Mapped
 from polycorner.proofs.lists.branches import Mask, items
 from polycorner.proofs.lists.contraction import narrowed
 from polycorner.proofs.lists.examination import without_images
@@ -24,9 +24,9 @@ from polycorner.proofs.lists.search import BoxSearch, Treated
 from polycorner.proofs.lists.tips import TipRegion, tips
 from polycorner.proofs.lists.tree import Boxes
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import SEARCH
 
 ATTEMPTS, RARE = 64, 8  # candidates that are tried in a chunk, regular and singular ones
-SMALL = 0.05  # side in scale units of boxes in which singular corners are sought
 NEWTON = 12
 MOST_SETS = 200  # of one size that relations are sought in
 
@@ -133,7 +133,8 @@ class CornerSearch(BoxSearch):
         ripe = [(box, rows) for box, rows in chunk.singular if boxes.since[box] >= every]
         for _, open_ in ripe[:RARE]:
             self._relate(open_)
-        for box, open_ in [(box, rows) for box, rows in ripe if sizes[box] < SMALL][:RARE]:
+        small = [(box, rows) for box, rows in ripe if sizes[box] < SEARCH.small_box]
+        for box, open_ in small[:RARE]:
             boxes.since[box] = 0
             for tip in tips(self.faces, boxes.middles[box], open_, 2 * sizes[box]):
                 if not self.known.has(0.5 * (tip.lower + tip.upper), frozenset(tip.active)):
@@ -153,7 +154,7 @@ class CornerSearch(BoxSearch):
         point = self._newton(q, rows, STRAY * size)
         if point is None or self.known.has(point, frozenset(rows)):
             return False
-        region = self.faces.vertex(point, rows, WIDER * size)
+        region = self.faces.vertex(point, rows, SEARCH.surroundings * size)
         if region is not None:
             self.known.add(region)
         return True

@@ -18,7 +18,7 @@ from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.coincidences import OPEN, ZERO, active_at, signs
 from polycorner.proofs.lists.corner_search import CornerSearch
 from polycorner.proofs.lists.domains import Domain
-from polycorner.proofs.lists.enumeration import MOST_BOXES, RESOLUTION, Limits, begun
+from polycorner.proofs.lists.enumeration import Limits, begun
 from polycorner.proofs.lists.faces import Region
 from polycorner.proofs.lists.listing import undecided
 from polycorner.proofs.lists.members import RegionPoint, full, image, placed, same
@@ -30,7 +30,7 @@ from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.search import skeleton
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import TOLERANCE, Tolerances
+from polycorner.tolerances import SEARCH, TOLERANCE, Tolerances
 
 MOST_OPEN = 6  # functions of unknown sign at a point, all of whose signs are gone through
 
@@ -296,8 +296,8 @@ def corners(
     *,
     box: Any,
     symmetry: Symmetry | None = None,
-    resolution: float = RESOLUTION,
-    max_boxes: int = MOST_BOXES,
+    resolution: float = SEARCH.resolution,
+    max_boxes: int = SEARCH.max_boxes,
     max_seconds: float = np.inf,
     workers: int = 1,
     progress: Progress = silent,

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from polycorner import checks
 from polycorner.checks import reals
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value, cached_property
 
-ROUNDING = 1e-12  # of boxes that are carried around circles, in scale units
+ROUNDING = 10 * DEFAULT.rounding  # of boxes that are carried around circles, in scale units
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,7 +51,7 @@ from polycorner.proofs.lists.stationary import StationaryList
 from polycorner.proofs.lists.stores import SearchStore
 from polycorner.proofs.parameter_boxes import check_parameters
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.tolerances import DEFAULT
+from polycorner.tolerances import DEFAULT, SEARCH
 
 if TYPE_CHECKING:
     import os
@@ -60,8 +60,6 @@ if TYPE_CHECKING:
 
 Interval = tuple[float, float]
 S = TypeVar("S", bound=BoxSearch)
-RESOLUTION = 1e-6
-MOST_BOXES = 10_000_000
 
 
 def with_parameters(
@@ -201,8 +199,8 @@ def stationary_points(
     symmetry: Symmetry | None = None,
     parameters: "Mapping[str, Interval] | None" = None,
     minima_only: bool = False,
-    resolution: float = RESOLUTION,
-    max_boxes: int = MOST_BOXES,
+    resolution: float = SEARCH.resolution,
+    max_boxes: int = SEARCH.max_boxes,
     max_seconds: float = np.inf,
     workers: int = 1,
     store: "str | os.PathLike[str] | None" = None,

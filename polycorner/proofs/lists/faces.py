@@ -38,6 +38,7 @@ from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import bordered, krawczyk, lagrangian, strictly_inside
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import SEARCH
 from polycorner.values import Value
 
 if TYPE_CHECKING:
@@ -56,7 +57,6 @@ MOST_WIDENING = 64.0
 GROWTH = 1.25
 LOOSENESS = 0.01  # of enclosures of points that parameters move, relative to their width
 GUESSED = (1.0, 0.7, 0.4)  # shares of a guessed box that are tried, as balls are the wider bounds
-WIDEST = 2.0  # reach of the widest box that is tried, in scale units
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +177,7 @@ class EnclosedFaces:
         free = list(self.free)
         for power in range(QUARTERINGS):
             radii = np.zeros_like(self.scales)
-            radii[free] = min(widest, WIDEST) / 4**power * self.scales[free]
+            radii[free] = min(widest, SEARCH.widest) / 4**power * self.scales[free]
             yield radii
 
     def _within(self, q: Array, rows: tuple[int, ...], count: int, radii: Array) -> Region | None:

@@ -26,7 +26,6 @@ from polycorner.tolerances import DEFAULT
 if TYPE_CHECKING:
     import sympy
 
-MARGIN = 1e-9  # by which w . q has to grow, in scale units
 MOST_ELEMENTS = 4096
 
 
@@ -197,9 +196,18 @@ def _normal(expression: "sympy.Expr") -> "sympy.Expr":
 
 
 def dropped(
-    lower: Array, upper: Array, motions: Sequence[Motion], weights: Array, domain: Domain
+    lower: Array,
+    upper: Array,
+    motions: Sequence[Motion],
+    weights: Array,
+    domain: Domain,
+    *,
+    margin: float = 1e-9,
 ) -> NDArray[np.bool_]:
-    """Return which boxes ``(B, n)`` a symmetry carries to others, see the module."""
+    """Return which boxes ``(B, n)`` a symmetry carries to others, see the module.
+
+    There ``w . q`` has to grow by a margin, in scale units.
+    """
     manifold = domain.manifold
     half = np.array(manifold.periods) / 2
     orders = np.array([g.order for g in motions])
@@ -213,7 +221,7 @@ def dropped(
         (orders, signs, shifts, back - weights),
         weights,
         (np.array(manifold.periods), *sides),
-        MARGIN,
+        margin,
     )
 
 

@@ -50,7 +50,6 @@ from polycorner.values import cached_property
 
 LARGE = 2.0**200
 MOST_DEFECT = 0.99
-SHIFT = 1e-10  # of the squares of gradients that are inverted, relative to their sum
 Truths = NDArray[np.bool_]
 Places = NDArray[np.intp]
 MOST_SETS = 2000  # of one size that are looked at in a batch of boxes
@@ -153,14 +152,17 @@ class Enclosures:
         return np.asarray(found & self.usable[np.ix_(at, places)].all(axis=1), dtype=np.bool_)
 
 
-def _combinations(middle: Array, reach: Array) -> Array:
-    """Return weights ``(B, C, r)`` of combinations of functions with gradients ``(B, r, N)``."""
+def _combinations(middle: Array, reach: Array, *, shift: float = 1e-10) -> Array:
+    """Return weights ``(B, C, r)`` of combinations of functions with gradients ``(B, r, N)``.
+
+    The shift makes the products of unit gradients regular where these are dependent.
+    """
     scaled = middle * reach[:, None, :]
     units = np.linalg.norm(scaled, axis=2, keepdims=True)
     units = np.where(units > 0, units, 1.0)
     rows = scaled / units
     count = rows.shape[1]
-    inverse = np.linalg.inv(rows @ rows.transpose(0, 2, 1) + SHIFT * np.eye(count))
+    inverse = np.linalg.inv(rows @ rows.transpose(0, 2, 1) + shift * np.eye(count))
     every = np.concatenate([inverse, rows.transpose(0, 2, 1) @ inverse], axis=1)
     return np.asarray(every / units[:, None, :, 0])
 

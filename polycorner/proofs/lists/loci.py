@@ -33,11 +33,11 @@ from polycorner.proofs.definite import is_definite
 from polycorner.proofs.kkt import krawczyk, strictly_inside
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.domains import Domain
-from polycorner.proofs.lists.faces import BITS, QUARTERINGS, WIDEST, enclosing, inertia, outward
+from polycorner.proofs.lists.faces import BITS, QUARTERINGS, enclosing, inertia, outward
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import SEARCH
 from polycorner.values import Value
 
-SHARP = 1e-9  # reach in scale units of the box whose image is the enclosure of a locus
 MOST_PIECES = 4096  # boxes in which a point of the set is looked for, at a time and in all
 
 
@@ -90,10 +90,10 @@ def locus(
     units = scales[list(z)]
     with precision(BITS):
         for power in range(QUARTERINGS):
-            shown = _shown(formulas, z, q, units * WIDEST / 4**power, held)
+            shown = _shown(formulas, z, q, units * SEARCH.widest / 4**power, held)
             if shown is not None:
                 # The wide box closes other boxes, the sharp one is told.
-                sharp = _shown(formulas, z, q, units * SHARP, held)
+                sharp = _shown(formulas, z, q, units * SEARCH.sharp_box, held)
                 return replace(
                     shown,
                     sharp_lower=(sharp or shown).sharp_lower,

@@ -42,14 +42,13 @@ from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
-from polycorner.proofs.lists.faces import BITS, WIDEST, EnclosedFaces, Region, enclosing, outward
+from polycorner.proofs.lists.faces import BITS, EnclosedFaces, Region, enclosing, outward
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import DEFAULT
+from polycorner.tolerances import DEFAULT, SEARCH
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
-LEAST = 1e-4  # weight, relative to the largest, so that small corrections leave weights positive
 SHRINKINGS = 8  # of a box
 LEAST_SHARE, MOST_SHARE = 0.25, 0.9  # of a box that the next one reaches
 ENOUGH = 1.001  # by how much a reach has to be large enough, roundings included
@@ -140,7 +139,7 @@ def _within(
     if exact is None:
         return None
     middle, radii = np.array([float(x.mid()) for x in point]), np.zeros_like(faces.scales)
-    radii[free] = min(widest, WIDEST) * faces.scales[free]
+    radii[free] = min(widest, SEARCH.widest) * faces.scales[free]
     for _ in range(SHRINKINGS):
         lower, upper = middle - radii, middle + radii
         box = enclosing(lower, upper)
@@ -159,14 +158,14 @@ def _within(
     return None
 
 
-def _guessed(slopes: Array, scales: Array) -> tuple[Array, Array] | None:
+def _guessed(slopes: Array, scales: Array, *, least: float = 1e-4) -> tuple[Array, Array] | None:
     """Return the largest steps and their weights, approximately; None if there are none."""
     from scipy.optimize import linprog
 
     g, pull = slopes[:-1] * scales, slopes[-1] * scales
     (count, n), sizes = g.shape, np.linalg.norm(g, axis=1)
     # No weight of 0: the exact correction that follows may make it negative.
-    least = LEAST * np.linalg.norm(pull) / sizes.max()
+    smallest = least * np.linalg.norm(pull) / sizes.max()
     steps, weights = np.zeros(2 * n), np.zeros((2 * n, count))
     for k in range(2 * n):
         sign, j = 1 - 2 * (k // n), k % n
@@ -176,7 +175,7 @@ def _guessed(slopes: Array, scales: Array) -> tuple[Array, Array] | None:
             np.append(np.zeros(count), -1.0),
             A_eq=np.hstack([g.T, side]),
             b_eq=pull,
-            bounds=[(least, None)] * count + [(0.0, 1e6 * np.linalg.norm(pull))],
+            bounds=[(smallest, None)] * count + [(0.0, 1e6 * np.linalg.norm(pull))],
         )
         if not found.success or not found.x[-1] > 0:
             return None

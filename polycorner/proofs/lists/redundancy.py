@@ -36,7 +36,7 @@ import numpy as np
 
 from polycorner.intervals.balls import precision
 from polycorner.intervals.enclosures import Undecided
-from polycorner.proofs.lists.attempts import WIDER, Attempts, Starts, active_sets
+from polycorner.proofs.lists.attempts import Attempts, Starts, active_sets
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.examination import Examined
 from polycorner.proofs.lists.faces import BITS, enclosing
@@ -44,7 +44,7 @@ from polycorner.proofs.lists.intermediate import covered, directions
 from polycorner.proofs.lists.known import Known, Setting
 from polycorner.proofs.lists.pinned import Pinned, pinned
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import DEFAULT
+from polycorner.tolerances import DEFAULT, SEARCH
 
 MOST_SETS = 500  # of one item
 MOST_ITEMS = 64  # of one chunk
@@ -138,7 +138,7 @@ def starts(setting: Setting, e: Examined, box: int, sets: Mask) -> Starts:
     """Return the middle of a box as a start for each set of functions."""
     q = np.repeat(e.boxes.middles[[box]], len(sets), axis=0)
     widths = (e.boxes.upper[box] - e.boxes.lower[box]) / setting.problem.scales
-    widest = np.full(len(sets), WIDER * widths[list(setting.domain.free)].max())
+    widest = np.full(len(sets), SEARCH.surroundings * widths[list(setting.domain.free)].max())
     return Starts(q, sets, widest, np.zeros(len(q), dtype=np.bool_))
 
 
@@ -168,7 +168,8 @@ def pin(setting: Setting, e: Examined, attempts: Attempts) -> None:
     fine = abs(values).max(axis=1, initial=0.0) <= DEFAULT.feasible * sizes
     fine &= (abs(q - boxes.middles) / units)[:, free].max(axis=1) <= STRAY * widths
     for i in np.flatnonzero(fine):
-        rows, reach = tuple(np.flatnonzero(masks[i]).tolist()), WIDER * float(widths[i])
+        rows = tuple(np.flatnonzero(masks[i]).tolist())
+        reach = SEARCH.surroundings * float(widths[i])
         if _is_pinned(setting.known, q[i], masks[i]) or attempts.failed.has(
             (PINS, *rows), q[i], reach
         ):

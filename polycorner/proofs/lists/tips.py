@@ -29,9 +29,10 @@ from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.definite import is_definite, is_regular
-from polycorner.proofs.lists.faces import BITS, WIDEST, EnclosedFaces, Region, enclosing, outward
+from polycorner.proofs.lists.faces import BITS, EnclosedFaces, Region, enclosing, outward
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import SEARCH
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
@@ -183,7 +184,7 @@ def _isolated(
     ]
     chosen = _relations(relations)
     q = np.array([float(x) for x in point])
-    for radii in faces.reaches(WIDEST) if chosen else ():
+    for radii in faces.reaches(SEARCH.widest) if chosen else ():
         lower, upper = q - radii, q + radii
         box = enclosing(lower, upper)
         forms = faces.formulas.smooth(box, faces.rows(active))
