@@ -107,7 +107,7 @@ Point = tuple[Fraction, ...]
 SUBJECT = "a minimum between two energies"
 
 
-class NotShownError(Exception):
+class UnshownError(Exception):
     """A hypothesis that is not shown, in a sentence."""
 
 
@@ -341,7 +341,7 @@ class Examination:
         """These functions, smooth on ``N``."""
         found = self.formulas.smooth(self.whole, self.rows)
         if isinstance(found, Undecided):
-            raise NotShownError(str(found))
+            raise UnshownError(str(found))
         return found
 
     @cached_property
@@ -400,19 +400,19 @@ class Examination:
         supports, size = len(self.witness.supports), len(self.core)
         if not supports or len(rows) < size:
             msg = "the gradients of the functions that support do not span"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         middle = np.array(
             [[float(x.mid()) for x in row] for row in (*around[: self.held], *self.normals)]
         )
         if not np.isfinite(middle).all():
             msg = "gradients are not finite"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         p = matrix(np.linalg.pinv(middle.T).tolist())
         across = matrix(rows).transpose()
         defect = _row_sums(identity(size) - across * p)
         if not defect < 1:
             msg = "the gradients of the functions that support are not shown to span on the box"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         t = defect / (1 - defect)
         slope = gradients[-1]
         rest = entries(column(slope) - across * column(self.weights))
@@ -422,7 +422,7 @@ class Examination:
         m = [lam + x for lam, x in zip(self.weights, shares, strict=True)]
         if not all(x > 0 for x in m[:supports]):
             msg = "multipliers are not shown to be positive on the box"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         sizes = [[abs(x) for x in row] for row in p.tolist()]
         spreads = [_largest(row) + t * sum(row, ball(0)) for row in sizes]
         kappa = _least([x.lower() / s for x, s in zip(m[:supports], spreads, strict=False)])
@@ -443,7 +443,7 @@ class Examination:
         lam = self.weights[: self.held]
         if not all(x > 0 for x in lam[:supports]):
             msg = "multipliers are not positive"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         form = matrix(hessians[-1])
         for x, hessian in zip(lam, hessians, strict=False):
             form = form - matrix(hessian) * x
@@ -451,11 +451,11 @@ class Examination:
         stiff = [x / f.upper() for x, f in zip(lam, top, strict=False)]
         if not all(x > 0 and x.is_finite() for x in stiff):
             msg = "functions that support are not bounded on the box"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         middle = np.array([[float(x.mid()) for x in row] for row in form.tolist()])
         if not np.isfinite(middle).all():
             msg = "second derivatives are not finite"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         # Equations hold exactly, so that any weight of theirs is right: one as large as the form.
         heavy = 1e6 * (abs(middle).max() or 1.0)
         stiff += [ball(heavy)] * len(w.equations) + [ball(heavy)] * len(w.gauges)
@@ -481,7 +481,7 @@ class Examination:
                     break
         else:
             msg = "second derivatives are not shown to be positive on the box"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
         slope = column(around[-1])
         if lam:
             slope = slope - matrix(around[: self.held]).transpose() * column(lam)
@@ -555,7 +555,7 @@ class _Zeros:
         if self.equations:
             forms = about.formulas.smooth(Box(hull), self.equations)
             if isinstance(forms, Undecided):
-                raise NotShownError(str(forms))
+                raise UnshownError(str(forms))
             some, gradients = forms.evaluate(Box(hull), 1)
             values += some
             rows += [[g * s for g, s in zip(row, about.scales, strict=True)] for row in gradients]
@@ -578,7 +578,7 @@ class _Zeros:
             inverse = middle_inverse([[row[j] for j in places] for row in rows])
             if inverse is None:
                 msg = "the equations are not shown to be independent"
-                raise NotShownError(msg)
+                raise UnshownError(msg)
             step = entries(inverse * column(values))
             size = max(float(abs(x).upper()) for x in step)
             for j, x in zip(places, step, strict=True):
@@ -606,7 +606,7 @@ class _Zeros:
                 return found
             radius = 4 * radius
         msg = "no point of the equations is enclosed"
-        raise NotShownError(msg)
+        raise UnshownError(msg)
 
 
 def examine(problem: Problem, formulas: Formulas, witness: Witness) -> "BoundedMinimum | Undecided":
@@ -623,7 +623,7 @@ def examine(problem: Problem, formulas: Formulas, witness: Witness) -> "BoundedM
     """
     try:
         return _examined(Examination(problem, formulas, witness))
-    except NotShownError as error:
+    except UnshownError as error:
         return Undecided(SUBJECT, str(error))
 
 
@@ -641,16 +641,16 @@ def _examined(about: Examination) -> BoundedMinimum:
     )
     if not (strict or (away < ball(w.reach) and free)):
         msg = "the inner point is not shown to lie inside the box"
-        raise NotShownError(msg)
+        raise UnshownError(msg)
     if not (strict or about.lies_in(inner)):
         msg = "the inner point is not shown to lie in the set"
-        raise NotShownError(msg)
+        raise UnshownError(msg)
     (above,) = about.formulas.values(inner, [about.energy_row])
     gap = ball(0) if strict else _upper((above - energy + growth.delta).max(ball(0)))
     radius = ball(0) if strict else _upper(growth.radius(gap))
     if not radius < ball(w.reach):
         msg = f"the minimum is not shown to be closer than the sides of the box, {radius.str(3)}"
-        raise NotShownError(msg)
+        raise UnshownError(msg)
     _check_room(about, radius)
     alone = _alone(about, growth, gap, ball(0) if strict else _upper(away))
     below = energy if strict else energy - growth.slack
@@ -671,35 +671,35 @@ def _check_box(about: Examination) -> None:
     for j, period in enumerate(problem.polyhedron.manifold.periods):
         if not ball(2 * w.reach) * about.scales[j] < ball(period / 2 if period < inf else 1e300):
             msg = "the box is half a period wide"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
     if not about.pieces:
         msg = "the set does not meet the box"
-        raise NotShownError(msg)
+        raise UnshownError(msg)
     every = frozenset.intersection(*about.pieces)
     if not set(w.supports) <= every:
         msg = "functions that support are not asked for by every branch, or positive on the box"
-        raise NotShownError(msg)
+        raise UnshownError(msg)
     m = problem.inequalities
     for row in range(m, m + len(problem.polyhedron.equations)):
         if row not in w.equations and not implied(about.formulas, w.equations, row):
             msg = f"the equation {about.formulas.names[row]} is not shown to follow from the others"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
     if w.gauges:
         vectors = []
         for gauge in w.gauges:
             if not all(annihilated(about.forms, gauge.field)):
                 msg = f"exact algebra does not show that nothing changes along {gauge.field}"
-                raise NotShownError(msg)
+                raise UnshownError(msg)
             along = gauge.field.at(about.whole.hull)
             if isinstance(along, Undecided):
-                raise NotShownError(str(along))
+                raise UnshownError(str(along))
             vectors.append(along)
         normals = [[ball(x) for x in gauge.normal] for gauge in w.gauges]
         table = matrix([[dot(normal, v) for v in vectors] for normal in normals])
         inverse = middle_inverse(table.tolist())
         if inverse is None or not _row_sums(identity(len(vectors)) - inverse * table) < 1:
             msg = "symmetries are not shown to cross the section"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
 
 
 def _check_room(about: Examination, radius: "Ball") -> None:
@@ -714,7 +714,7 @@ def _check_room(about: Examination, radius: "Ball") -> None:
     for i, value in zip(others, values, strict=True):
         if not value > 0:
             msg = f"{about.formulas.names[i]} is not shown to leave room to what rattles"
-            raise NotShownError(msg)
+            raise UnshownError(msg)
 
 
 def _alone(

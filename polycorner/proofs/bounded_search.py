@@ -22,7 +22,7 @@ from polycorner.proofs.bounded import (
     BoundedMinimum,
     Examination,
     Gauge,
-    NotShownError,
+    UnshownError,
     Witness,
     examine,
     reads,
@@ -42,7 +42,7 @@ TRIES = 8  # boxes in which the growth is shown, and the rest is tried
 SIMPLE = 10_000  # largest denominator of a coordinate that is taken to be rational
 
 
-class Search:
+class WitnessSearch:
     """The witnesses near one point.
 
     Parameters
@@ -377,7 +377,7 @@ class Search:
             reach /= 2
             try:
                 about.growth  # noqa: B018 - it raises
-            except NotShownError:
+            except UnshownError:
                 continue
             complete = self._with_inner(about, bits)
             if complete is not None:
@@ -429,7 +429,7 @@ class Search:
             trial = replace(about, witness=witness)
             try:
                 box = trial.inner_box()
-            except NotShownError:
+            except UnshownError:
                 return None
             if about.lies_in(box):
                 return witness
@@ -448,4 +448,4 @@ def bounded_minimum(
     digits: int,
 ) -> BoundedMinimum | Undecided:
     """Return a minimum that is shown to lie near a point, between two energies, or why none is."""
-    return Search(problem, formulas, point, fields, tolerances).run(digits)
+    return WitnessSearch(problem, formulas, point, fields, tolerances).run(digits)
