@@ -28,6 +28,10 @@ else:
             return vars(instance).setdefault(self.attrname, self.func(instance))
 
 
+HOLDERS = (np.ndarray, tuple, dict)  # what arrays are looked for in
+PLAIN = frozenset({int, float, bool, str, type(None)})  # tuples of these alone hold no arrays
+
+
 class Value:
     """Base of immutable values.
 
@@ -39,10 +43,10 @@ class Value:
 
     def __post_init__(self) -> None:
         """Make the arrays among the attributes read-only."""
-        for name, value in vars(self).items():
-            frozen = read_only(value)
-            if frozen is not value:
-                object.__setattr__(self, name, frozen)
+        own = vars(self)
+        for name, value in own.items():
+            if isinstance(value, HOLDERS):
+                own[name] = read_only(value)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes without what is computed on demand."""
@@ -82,7 +86,7 @@ def read_only(value: Any) -> Any:
         view = value.view()
         view.flags.writeable = False
         return view
-    if type(value) is tuple:
+    if type(value) is tuple and not PLAIN.issuperset(map(type, value)):
         parts = tuple(map(read_only, value))
         return parts if any(a is not b for a, b in zip(parts, value, strict=True)) else value
     if type(value) is dict:

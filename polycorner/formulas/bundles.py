@@ -54,6 +54,12 @@ def resolve(
     return binding.shape, reads, (*f.parameters, *binding.numbers), 0
 
 
+def _run(positions: tuple[int, ...]) -> slice | None:
+    """Return successive positions as a slice."""
+    run = slice(positions[0], positions[0] + len(positions)) if positions else slice(0)
+    return run if positions == tuple(range(run.start or 0, run.stop)) else None
+
+
 class _Batch:
     """Calls of one kernel with different coordinates or parameters: one call over all of them."""
 
@@ -70,30 +76,25 @@ class _Batch:
         self.columns: Any = np.s_[:] if everything else list(first.columns)
         rows, reads = np.array([call.rows for call in calls]), self.reads
         self.places: tuple[tuple[Any, ...], ...] = (
-            (rows,),
-            (rows[:, :, None], reads[:, None, :]),
-            (rows[:, :, None, None], reads[:, None, :, None], reads[:, None, None, :]),
+            (..., rows),
+            (..., rows[:, :, None], reads[:, None, :]),
+            (..., rows[:, :, None, None], reads[:, None, :, None], reads[:, None, None, :]),
         )
+        row, read = _run(first.rows), _run(first.reads)
+        if len(calls) == 1 and row is not None and read is not None:  # a block, copied as one
+            self.places = (..., None, row), (..., None, row, read), (..., None, row, read, read)
 
     def scatter(self, q: Array, results: tuple[Array, ...]) -> None:
-        """Evaluate at every row of ``q`` ``(N, n)`` and scatter the results."""
-        count, order = len(self.reads), len(results) - 1
-        inputs = q[:, self.reads].reshape(len(q) * count, self.reads.shape[1])
-        parts = self.kernel.over(inputs, self.address, order, self.period)
-        for result, part, place in zip(results, parts, self.places, strict=False):
-            shaped = part.reshape(len(q), count, *part.shape[1:])
-            result[(slice(None), *place)] = shaped[:, :, self.columns]
-
-    def scatter_point(self, q: Array, results: tuple[Array, ...]) -> None:
-        """Evaluate at the point ``q`` ``(n,)`` and scatter the results."""
-        order = len(results) - 1
-        if len(self.reads) == 1:
-            single = self.kernel.at(q[self.reads[0]], self.address, order)
-            parts = tuple([part[None] for part in single])
+        """Evaluate at the point or points ``q`` ``(..., n)`` and scatter the results."""
+        order, outer = len(results) - 1, (*q.shape[:-1], len(self.reads))
+        if outer == (1,):
+            parts = self.kernel.at(q[self.reads[0]], self.address, order)
         else:
-            parts = self.kernel.over(q[self.reads], self.address, order, self.period)
-        for result, part, place in zip(results, parts, self.places, strict=False):
-            result[place] = part[:, self.columns]
+            inputs = q[..., self.reads].reshape(-1, self.reads.shape[1])
+            parts = self.kernel.over(inputs, self.address, order, self.period)
+        for k, (result, part, place) in enumerate(zip(results, parts, self.places, strict=False)):
+            block = part.reshape(*outer, *part.shape[-1 - k :])
+            result[place] = block[(..., self.columns, *(np.s_[:],) * k)]
 
 
 class Bundle(Value):
@@ -139,27 +140,16 @@ class Bundle(Value):
 
         ``q`` must be a float64 array ``(..., n)``; nothing is checked here.
         """
-        if q.ndim == 1:
-            return self._at(q, order)
-        flat = q.reshape(-1, q.shape[-1])
-        if self._direct is not None:
-            call = self._direct
-            results = call.family.kernel.over(flat, call.parameters.ctypes.data, order)
-        else:
-            results = tuple([np.zeros((len(flat), *shape)) for shape in self._shapes(order)])
+        if self._direct is None:
+            results = tuple([np.zeros(q.shape[:-1] + shape) for shape in self._shapes(order)])
             for batch in self._batches:
-                batch.scatter(flat, results)
-        outer = q.shape[:-1]
-        return tuple([result.reshape(outer + result.shape[1:]) for result in results])
-
-    def _at(self, q: Array, order: int) -> tuple[Array, ...]:
-        if self._direct is not None:
-            batch = self._batches[0]
+                batch.scatter(q, results)
+            return results
+        batch = self._batches[0]
+        if q.ndim == 1:
             return batch.kernel.at(q, batch.address, order)
-        results = tuple([np.zeros(shape) for shape in self._shapes(order)])
-        for batch in self._batches:
-            batch.scatter_point(q, results)
-        return results
+        results = batch.kernel.over(q.reshape(-1, q.shape[-1]), batch.address, order)
+        return tuple([result.reshape(q.shape[:-1] + result.shape[1:]) for result in results])
 
     def _shapes(self, order: int) -> tuple[tuple[int, ...], ...]:
         m, n = len(self.functions), self.manifold.size

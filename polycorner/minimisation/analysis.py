@@ -122,7 +122,7 @@ def analyse(
     """
     local = Local.at(problem, q, tolerances, higher)
     values, gradients, hessians = local.values, local.gradients, local.hessians
-    pieces = local_pieces(problem.polyhedron, values[:-1], gradients[:-1], tolerances.zero)
+    pieces = local_pieces(problem.polyhedron, local.away, tolerances.zero)
     if not pieces:
         return _without_conditions(local, Verdict.OUTSIDE, "")
     if not np.isfinite(values[-1]):

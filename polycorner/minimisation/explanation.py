@@ -21,7 +21,7 @@ from polycorner.minimisation.findings import (
 )
 from polycorner.minimisation.verdicts import SEARCHES, Entrapment, Verdict
 from polycorner.polyhedra.cones import null_space, rank
-from polycorner.polyhedra.strata import Stratum, distances
+from polycorner.polyhedra.strata import Stratum
 from polycorner.printing import angle_unit, number
 from polycorner.spaces.manifold import Array
 
@@ -111,7 +111,7 @@ def _missed(a: Analysis, unit: str | None, *, flat: float = 1e-3) -> str:
     Its value counts as stationary up to a slope of ``flat`` times that of the parabola.
     """
     d, local = a.local.problem.polyhedron, a.local
-    away = distances(local.values[:-1], local.gradients[:-1])
+    away = local.away
     m = a.local.problem.inequalities
     if np.isnan(away).any():
         return f"{(d.names + d.equation_names)[int(np.isnan(away).argmax())]} is not finite there."

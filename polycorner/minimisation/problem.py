@@ -66,6 +66,10 @@ class Problem(Checked):
         return self.polyhedron.manifold.scale_array
 
     @cached_property
+    def _areas(self) -> Array:
+        return np.outer(self.scales, self.scales)
+
+    @cached_property
     def functions(self) -> tuple[SmoothFunction, ...]:
         """The function of every row."""
         return (*self.polyhedron.functions, *self.polyhedron.equations, self.energy)
@@ -80,7 +84,7 @@ class Problem(Checked):
         if order >= 1:
             results[1] = results[1] * self.scales
         if order >= 2:
-            results[2] *= np.outer(self.scales, self.scales)  # (M, n, n) may be large: no copy
+            results[2] *= self._areas  # (M, n, n) may be large: no copy
         return tuple(results)
 
     def stated(self, by_name: Mapping[str, T]) -> dict[str, T]:

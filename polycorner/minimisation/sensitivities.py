@@ -235,10 +235,9 @@ def _refuse(reason: str) -> NoReturn:
 def _check_point(certificate: Certificate) -> None:
     """Raise where the implicit function theorem does not apply."""
     a, d = certificate.found, certificate.problem.polyhedron
-    values, gradients = a.local.values[:-1], a.local.gradients
     if a.verdict in {Verdict.OUTSIDE, Verdict.DOMAIN_EDGE}:
         _refuse(str(a.verdict.value))
-    if d.is_union and len(local_pieces(d, values, gradients[:-1], certificate.tolerance)) > 1:
+    if d.is_union and len(local_pieces(d, a.local.away, certificate.tolerance)) > 1:
         _refuse("several pieces of the polyhedron meet there")
     if not a.independent:
         _refuse(f"the gradients of {names(certificate.active, LONGEST)} are dependent")

@@ -250,8 +250,7 @@ class EvaluatedPoint:
     def active(self) -> frozenset[int] | None:
         """Return the functions that vanish and matter here; None outside the polyhedron."""
         quotient = self.quotient
-        zero = quotient.tolerances.zero
-        found = local_pieces(quotient.polyhedron, self.values, self.gradients, zero)
+        found = local_pieces(quotient.polyhedron, self.distances, quotient.tolerances.zero)
         return frozenset().union(*found) if found else None
 
     def matrix(self, rows: Sequence[int]) -> Array:

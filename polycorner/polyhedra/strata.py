@@ -127,7 +127,7 @@ def stratum_of(
     rank_tolerance: float = RANK_TOLERANCE,
 ) -> Stratum:
     """Classify a point by values and scaled gradients there; see :func:`stratum_at`."""
-    pieces = local_pieces(polyhedron, values, gradients, tolerance)
+    pieces = local_pieces(polyhedron, distances(values, gradients), tolerance)
     active = sorted(set().union(*pieces))
     m, hidden = len(polyhedron.functions), polyhedron.normalised
     jacobian = gradients[[*active, *range(m, len(values))]]
@@ -156,26 +156,25 @@ def distances(values: Array, gradients: Array) -> Array:
     Infinite where ``f`` is not zero and its gradient vanishes or is not finite; NaN where ``f`` is
     not finite.
     """
-    sizes = np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
+    sizes, known = np.sqrt(np.einsum("ij,ij->i", gradients, gradients)), np.isfinite(values)
+    plain = (sizes > 0) & (sizes < np.inf) & known
+    if plain.all():
+        return np.asarray(values / sizes)
     far = np.where(values == 0, 0.0, np.copysign(np.inf, values))
-    far[~np.isfinite(values)] = np.nan
-    return np.asarray(
-        np.divide(
-            values, sizes, out=far, where=(sizes > 0) & np.isfinite(sizes) & np.isfinite(values)
-        )
-    )
+    far[~known] = np.nan
+    return np.asarray(np.divide(values, sizes, out=far, where=plain))
 
 
-def local_pieces(
-    polyhedron: Polyhedron, values: Array, gradients: Array, tolerance: float
-) -> list[Piece]:
-    """Return the polyhedron near a point as a union of pieces; none where the point is outside."""
-    away = distances(values, gradients)
+def local_pieces(polyhedron: Polyhedron, away: Array, tolerance: float) -> list[Piece]:
+    """Return the polyhedron near a point as a union of pieces; none where the point is outside.
+
+    Given are the :func:`distances` of its inequalities and equations.
+    """
     m = len(polyhedron.functions)
     if (abs(away[m:]) > tolerance).any() or np.isnan(away).any():
         return []
-    signs = np.where(away > tolerance, 1, np.where(away < -tolerance, -1, 0))
-    return polyhedron.signs_to_pieces(signs[:m].tolist())
+    signs = np.sign(away[:m]) * (abs(away[:m]) > tolerance)
+    return polyhedron.signs_to_pieces(signs.tolist())
 
 
 def _local_type(pieces: list[Piece], gradients: Array, m: int, rank_tolerance: float) -> LocalType:
