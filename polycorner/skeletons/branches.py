@@ -193,8 +193,8 @@ class Branches:
             if len(opened) < least:
                 continue
             values, axes = _positive(self._forms(held, some)[0])
-            least = max(self.limit, self.point.quotient.options.definite * values[-1])
-            if values[1] > least and abs(values[0]) <= self.limit:
+            clear = max(self.limit, self.point.quotient.options.definite * values[-1])
+            if values[1] > clear and abs(values[0]) <= self.limit:
                 for d in (axes[:, 0], -axes[:, 0]):
                     yield from self._entering(some.null_space @ d, opened, held)
 
