@@ -215,6 +215,7 @@ class BoundedMinimum(Value):
             where = "is the point" if self.strict else f"lies within {inner} scale units of it"
             found["nothing else"] = (
                 f"every stationary point within {outer} scale units of the centre {where}"
+                f"{', as far as the others are in their room' if self.rattling else ''}"
             )
         if self.rattling:
             sides = {names[j]: number_of(2 * self.witness.room[j]) for j in self.rattling}
@@ -722,7 +723,7 @@ def _alone(
 ) -> tuple[Fraction, Fraction] | None:
     """Return ``x0`` and ``R1`` of the theorem, or None where it says nothing."""
     w = about.witness
-    supports, k, size = len(w.supports), len(w.equations), len(about.core)
+    supports, k = len(w.supports), len(w.equations)
     rattling = set(about.rattling)
     if w.order != 1 or about.problem.polyhedron.is_union:
         return None
@@ -755,7 +756,6 @@ def _alone(
         pulls[j] = abs(through[len(first) - 1, j]) + pull * _largest(shares)
         curvature += pulls[j] * sums[supports + j]
     curvature = _upper(curvature)
-    assert size
 
     def phi(x: "Ball") -> bool:
         return bool(growth.kappa * x - gap - curvature * square(x + away) / 2 > 0)
