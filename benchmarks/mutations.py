@@ -26,15 +26,15 @@ spaces/embedding.py: np.sinc(angle / np.pi) * along => np.sinc(angle) * along
 [polyhedra]
 polyhedra/cones.py: slopes[p] * rays[q] - slopes => slopes[p] * rays[q] + slopes
 polyhedra/nerves.py: if death < birth: => if death <= birth:
-polyhedra/affine.py: aim[n] - result.fun => aim[n] + result.fun
+polyhedra/nerves.py: aim[n] - result.fun => aim[n] + result.fun
 polyhedra/strata.py: dimension=polyhedron.dimension - r, => dimension=polyhedron.dimension,
 [formulas/test_interval_kernels.py intervals]
-intervals/balls.py: 1 / (2 * y) => 1 / y
+formulas/operations.py: g.const(Fraction(1, 2)), g.div( => g.const(Fraction(1, 3)), g.div(
 intervals/balls.py: down, up = lower // unit, -(-upper => down, up = lower // unit, (upper
 formulas/interval_library.py: low = b.fsub(r.fold(ends, => low = b.fadd(r.fold(ends,
 formulas/interval_library.py: ">=", r.call("floor", last) => ">", r.call("floor", last)
 formulas/ranges.py: return near, math.nextafter(near, math.inf) => return near, near
-formulas/ranges.py: odd = op in {"tanh", => odd = op in {"sin", "tanh",
+formulas/ranges.py: known.values[0], known.keeps_signs => known.values[0], True
 [formulas]
 formulas/translate.py: g.node("le", t(e.args[1]), t(e.args[0])) => g.node("lt", t(e.args[0]), 0)
 formulas/shapes.py: len(monomial) + power > 2 => len(monomial) + power > 3
@@ -49,7 +49,7 @@ bodies/congruences.py: return mirrors, round( => return mirrors, 0 * round(
 minimisation/copositivity.py: x = 1.0 / m - np.einsum => x = 1.0 / m + np.einsum
 minimisation/conditions.py: (values[:k] >= -small).all() => (values >= -small).all()
 minimisation/conditions.py: target[i] = -side * np.inf => target[i] = side * np.inf
-minimisation/sensitivities.py: if len(weak): => if len(weak) > 1:
+minimisation/sensitivities.py: if a.weak: => if len(a.weak) > 1:
 minimisation/descent/sqp.py: energy + 1e-4 * factor => energy - 1e-4 * factor
 [motion/test_forces.py motion/test_friction.py motion/test_impacts.py]
 motion/lagrange.py: g.add(g.sub(rest[i], rise.get => g.sub(g.sub(rest[i], rise.get
@@ -64,12 +64,12 @@ skeletons/indices.py: low & ~before => low & before
 skeletons/sectors.py: < 1 - tolerances.dependent => < 1
 [sweeps/test_refusals.py sweeps/test_values.py files test_container.py cli dumbbells/cli]
 sweeps/grid.py: np.isnan(array).any() => np.isnan(array).all()
-files/skeleton_forms.py: > active and operator.eq => >= active and operator.eq
+files/skeletons.py: > active and operator.eq => >= active and operator.eq
 container.py: if not stored or sum( => if stored and sum(
-cli/report.py: b if a == corner else a for => a if a == corner else b for
+cli/search.py: b if a == corner else a for => a if a == corner else b for
 [proofs/test_krawczyk.py proofs/test_verification.py proofs/test_exact.py proofs/test_invariance.py]
-proofs/krawczyk.py: w.contains_interior(x) => w.contains(x)
-proofs/definite.py: nrows() and all(pivot > 0 for pivot in found) => nrows()
+proofs/kkt.py: x.contains_interior(y) for => x.contains(y) for
+proofs/definite.py: len(form) and all(pivot > 0 for pivot in found) => len(form)
 proofs/polynomials.py: + sign * weight => + weight
 [proofs/lists/test_forged_lists.py proofs/lists/test_checker.py proofs/lists/test_contraction.py]
 proofs/lists/checker/faces.py: all(x > 0 for x in found[: len(self.active)]) => True
