@@ -72,7 +72,7 @@ proofs/kkt.py: x.contains_interior(y) for => x.contains(y) for
 proofs/definite.py: len(form) and all(pivot > 0 for pivot in found) => len(form)
 proofs/polynomials.py: + sign * weight => + weight
 [proofs/lists/test_forged_lists.py proofs/lists/test_checker.py proofs/lists/test_contraction.py]
-proofs/lists/checker/faces.py: all(x > 0 for x in found[: len(self.active)]) => True
+proofs/checker/faces.py: all(x > 0 for x in found[: len(self.active)]) => True
 proofs/lists/directions.py: UNIT * size - TINY => UNIT * size + 2 * TINY
 [models/wells/test_escape.py models/disks/test_critical.py]
 models/wells/escape.py: -near[:-1] / (far => near[:-1] / (far

@@ -14,8 +14,8 @@ import flint
 import numpy as np
 
 from benchmarks.trials.known import Posed
-from polycorner.proofs.lists.checker.balls import NotShownError
-from polycorner.proofs.lists.checker.verdict import check
+from polycorner.proofs.checker.balls import NotShownError
+from polycorner.proofs.checker.verdict import check
 from polycorner.proofs.lists.stationary import StationaryList
 from polycorner.proofs.lists.tree import CLOSED, OPEN
 

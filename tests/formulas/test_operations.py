@@ -20,7 +20,7 @@ from polycorner.intervals.balls import ANALYTIC, PARTIALS, ball, bounds, operati
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.minimisation.jets import function_series
 from polycorner.minimisation.series import ring
-from polycorner.proofs.lists.checker import operations as checker
+from polycorner.proofs.checker import operations as checker
 
 M = Manifold.euclidean("x")
 x = M.symbols[0]

@@ -7,7 +7,7 @@ import zipfile
 
 import flint
 
-from polycorner.proofs.lists.checker.__main__ import main
+from polycorner.proofs.checker.__main__ import main
 
 
 def verdict(path, *options):

@@ -1,4 +1,4 @@
-"""Files with a complete list and its proof, which :mod:`~polycorner.proofs.lists.checker` verifies.
+"""Files with a complete list and its proof, which :mod:`~polycorner.proofs.checker` verifies.
 
 A file is a zip archive of
 

@@ -134,7 +134,7 @@ class ProvedList(Printed, Checked, Generic[P]):
     def save(self, path: "str | os.PathLike[str]") -> "Path":
         """Save the list and its proof, for an independent checker; return the path.
 
-        See :mod:`polycorner.proofs.lists.checker`.
+        See :mod:`polycorner.proofs.checker`.
 
         Raises
         ------

@@ -23,10 +23,11 @@ from polycorner.errors import NonsmoothWarning
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.enclosures import Formulas
 from polycorner.polyhedra.symmetry import Element, Symmetry
-from polycorner.proofs.lists import checker, records, search
-from polycorner.proofs.lists.checker import balls, problem
-from polycorner.proofs.lists.checker.__main__ import main
-from polycorner.proofs.lists.checker.proof import StoredProof
+from polycorner.proofs import checker
+from polycorner.proofs.checker import balls, problem
+from polycorner.proofs.checker.__main__ import main
+from polycorner.proofs.checker.proof import StoredProof
+from polycorner.proofs.lists import records, search
 from polycorner.proofs.lists.enumeration import stationary_points
 
 PLANE = Manifold.euclidean("x y")

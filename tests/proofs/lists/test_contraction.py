@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from polycorner import AnyOf, Manifold, NonsmoothWarning, Polyhedron, SmoothFunction
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.proofs import corners, stationary_points
+from polycorner.proofs.checker.balls import hull
+from polycorner.proofs.checker.proof import StoredProof
+from polycorner.proofs.checker.verdict import check, contents
 from polycorner.proofs.lists import search
 from polycorner.proofs.lists.branches import conjunctions
-from polycorner.proofs.lists.checker.balls import hull
-from polycorner.proofs.lists.checker.proof import StoredProof
-from polycorner.proofs.lists.checker.verdict import check, contents
 from polycorner.proofs.lists.contraction import narrowed
 from polycorner.proofs.lists.tree import Boxes
 

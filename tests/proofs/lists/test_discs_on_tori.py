@@ -16,7 +16,7 @@ from benchmarks.trials.torus_discs import WHOLE, several_discs, square_of, symme
 from polycorner import Manifold, Polyhedron
 from polycorner.models.disks.disks import TorusDisks
 from polycorner.proofs import stationary_points
-from polycorner.proofs.lists.checker.__main__ import main
+from polycorner.proofs.checker.__main__ import main
 
 LARGEST = (math.sqrt(6) - math.sqrt(2)) / 4  # of three and of four discs on the square torus
 

@@ -12,9 +12,9 @@ from scipy.optimize import root
 from polycorner import AnyOf, Manifold, NonsmoothWarning, Polyhedron, SmoothFunction
 from polycorner.minimisation.problem import pose
 from polycorner.proofs import stationary_points
+from polycorner.proofs.checker.balls import NotShownError
+from polycorner.proofs.checker.verdict import check
 from polycorner.proofs.lists import search as searching
-from polycorner.proofs.lists.checker.balls import NotShownError
-from polycorner.proofs.lists.checker.verdict import check
 from polycorner.proofs.lists.domains import domain
 from polycorner.proofs.lists.examination import without_minima
 from polycorner.proofs.lists.search import StationarySearch

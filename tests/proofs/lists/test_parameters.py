@@ -6,7 +6,7 @@ import pytest
 from polycorner import Manifold, Polyhedron, SmoothFunction, Symmetry
 from polycorner.polyhedra.symmetry import Element
 from polycorner.proofs import stationary_points
-from polycorner.proofs.lists.checker.verdict import check
+from polycorner.proofs.checker.verdict import check
 
 PLANE = Manifold.euclidean("x y")
 X, Y = PLANE.symbols

@@ -14,7 +14,7 @@ from polycorner import AnyOf, Manifold, Polyhedron, Symmetry
 from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.symmetry import Element
 from polycorner.proofs import stationary_points
-from polycorner.proofs.lists.checker import __main__ as checker
+from polycorner.proofs.checker import __main__ as checker
 from polycorner.proofs.lists.domains import domain
 from polycorner.proofs.lists.members import OUT, judged
 from polycorner.proofs.lists.search import StationarySearch
