@@ -19,7 +19,7 @@ from polycorner.proofs.hypotheses import (
     ConditionResult,
     Status,
     check_hypotheses,
-    undecided,
+    of_a_choice,
     without_enclosure,
 )
 from polycorner.proofs.invariance import (
@@ -40,6 +40,7 @@ MOST_SUBSETS = 1000  # of one size that are examined
 BITS_PER_DIGIT = 3.3220
 GUARD_BITS = 64
 MOST_FACES = 8  # on which a proof is tried
+BRIEF_FACES = 3  # where something is proved already
 MOST_DOUBLINGS = 3  # of the precision, until every condition is decided
 MOST_SINGULAR = 1  # of the precision, where the equations seem to be singular
 PROVED = 3  # the rank of an attempt at which nothing is left open
@@ -243,10 +244,14 @@ class Attempt:
         return any(result.status is Status.UNDECIDED for result in self.found.values())
 
     @property
+    def proved(self) -> bool:
+        """Whether nothing is left open."""
+        return self.rank == PROVED
+
+    @property
     def settled(self) -> bool:
         """Whether the claim is proved or refuted."""
-        failed = any(result.status is Status.FAILED for result in self.found.values())
-        return failed or self.rank == PROVED
+        return self.proved or any(x.status is Status.FAILED for x in self.found.values())
 
     @property
     def rank(self) -> int:
@@ -259,25 +264,31 @@ class Attempt:
 
 
 def attempt(
-    certificate: Certificate, fields: Sequence[Generator], formulas: Formulas, digits: int
+    certificate: Certificate,
+    fields: Sequence[Generator],
+    formulas: Formulas,
+    digits: int,
+    *,
+    brief: bool = False,
 ) -> Attempt:
     """Prove a minimum on one of the faces that may carry the energy's gradient.
 
     Where none is proved, the first at whose point most is known is returned.  Functions that are
     active within the certificate's tolerance but violated at the KKT point of a face join it for
-    another attempt.
+    another attempt.  A brief attempt tries few faces, and precision is not doubled.
     """
+    most, doublings = (BRIEF_FACES, 0) if brief else (MOST_FACES, MOST_DOUBLINGS)
     best: Attempt | None = None
     tried: set[tuple[int, ...]] = set()
     waiting = faces(certificate)
-    while len(tried) < MOST_FACES and (face := next(waiting, None)) is not None:
+    while len(tried) < most and (face := next(waiting, None)) is not None:
         if face in tried:
             continue
         tried.add(face)
-        result = _on_face(certificate, face, fields, formulas, digits)
+        result = _on_face(certificate, face, fields, formulas, digits, doublings)
         if best is None or result.rank > best.rank:
             best = result
-        if result.rank == PROVED:
+        if result.proved:
             break
         missed = _missed(certificate, result, formulas)
         if missed:
@@ -302,10 +313,11 @@ def _on_face(
     fields: Sequence[Generator],
     formulas: Formulas,
     digits: int,
+    most: int,
 ) -> Attempt:
     """Enclose the KKT point of a face and check it, with more and more bits until all is decided.
 
-    Their number is doubled at most ``MOST_DOUBLINGS`` times.
+    Their number is doubled at most ``most`` times.
     """
     bits = bits_for(digits)
     posed = pose_claim(certificate, face, fields, formulas)
@@ -313,12 +325,14 @@ def _on_face(
         return Attempt(face, posed, posed, without_enclosure(posed), bits)
     best: Attempt | None = None
     others = [i for i in certificate.analysis.active if i not in face]
-    for doublings in range(MOST_DOUBLINGS + 1):
+    for doublings in range(most + 1):
         enclosure = _enclosed(certificate, posed, bits)
         with precision(bits):
             found = _checked(posed, enclosure)
             if others and not isinstance(enclosure, Undecided):
-                found = _of_a_choice(posed.claim, others, enclosure, found)
+                values = formulas.values(enclosure.neighbourhood(), others)
+                closed = [i for i, value in zip(others, values, strict=True) if not value > 0]
+                found = of_a_choice(posed.claim, closed, found)
             result = Attempt(face, posed, enclosure, found, bits)
             if best is None or result.rank >= best.rank:
                 best = result
@@ -336,25 +350,6 @@ def _checked(posed: Posed, enclosure: Enclosure | Undecided) -> Mapping[str, Con
     if isinstance(enclosure, Undecided):
         return without_enclosure(enclosure, symmetric=bool(posed.claim.fields))
     return check_hypotheses(posed.claim, enclosure)
-
-
-def _of_a_choice(
-    claim: Claim, others: Sequence[int], enclosure: Enclosure, found: Mapping[str, ConditionResult]
-) -> Mapping[str, ConditionResult]:
-    """Return what is known where a face leaves out active functions, which may support as well.
-
-    Where these are positive nothing else can, and a condition that is violated refutes the
-    minimum; elsewhere the functions of another choice may meet it.
-    """
-    values = claim.system.formulas.values(enclosure.neighbourhood(), others)
-    closed = [i for i, value in zip(others, values, strict=True) if not value > 0]
-    if not closed:
-        return found
-    about = f"{', '.join(claim.named(closed))} may support as well, in another choice of functions"
-    return {
-        name: undecided(f"{result.reason}; {about}") if result.status is Status.FAILED else result
-        for name, result in found.items()
-    }
 
 
 def bits_for(digits: int) -> int:

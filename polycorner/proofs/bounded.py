@@ -96,6 +96,7 @@ from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.definite import pivots
 from polycorner.proofs.exact import implied
 from polycorner.proofs.invariance import Generator, annihilated
+from polycorner.proofs.rattlers import reads
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.values import Value, cached_property
 
@@ -195,7 +196,7 @@ class BoundedMinimum(Value):
             sides.append((c - half, c + half))
         return tuple(sides)
 
-    def conditions(self, names: Sequence[str], rows: Sequence[str]) -> dict[str, str]:
+    def conditions(self, rows: Sequence[str]) -> dict[str, str]:
         """Return the conditions that are shown, each with a reason."""
         supports = ", ".join(rows[i] for i in self.witness.supports) or "nothing"
         lemma = {
@@ -216,12 +217,6 @@ class BoundedMinimum(Value):
             found["nothing else"] = (
                 f"every stationary point within {outer} scale units of the centre {where}"
                 f"{', as far as the others are in their room' if self.rattling else ''}"
-            )
-        if self.rattling:
-            sides = {names[j]: number_of(2 * self.witness.room[j]) for j in self.rattling}
-            room = ", ".join(f"{name} ({side})" for name, side in sides.items())
-            found["room"] = (
-                f"these coordinates may have any value in a side of so many units: {room}"
             )
         return found
 
@@ -250,13 +245,6 @@ class _Growth:
     def slack(self) -> "Ball":
         """How far the energy may lie below ``E(c)``."""
         return self.delta + (square(self.eps) / (2 * self.sigma) if self.sigma > 0 else ball(0))
-
-
-def reads(formulas: Formulas, row: int) -> frozenset[int]:
-    """Return the coordinates that a function depends on."""
-    graph = formulas.graph
-    nodes = (graph.nodes[a] for a in graph.needed([formulas.outputs[row]]))
-    return frozenset(int(args[0]) for op, args in nodes if op == "var")
 
 
 @dataclass(frozen=True, eq=False)

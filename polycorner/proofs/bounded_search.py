@@ -25,9 +25,9 @@ from polycorner.proofs.bounded import (
     UnshownError,
     Witness,
     examine,
-    reads,
 )
 from polycorner.proofs.invariance import Generator, generators, translations
+from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.tolerances import Tolerances
 
 if TYPE_CHECKING:
@@ -217,49 +217,9 @@ class WitnessSearch:
         gaps = rows @ found.x + right
         return [i for i, gap in zip(contacts, gaps.tolist(), strict=True) if gap < 1e-6]
 
-    # --------------------------------------------------------------------------------- rattlers
-
-    def roomy(self, q: "Array", rattling: Sequence[int]) -> "Array":
-        """Return a point at which functions that read what rattles are as large as can be found."""
-        best = np.array(q)
-        places, reach = list(rattling), 0.1
-        rows = self._reading(rattling)
-        if not rows:
-            return best
-        for _ in range(40):
-            values, gradients = self.problem.evaluate(best, 1)
-            table = gradients[rows][:, places]
-            sizes = np.linalg.norm(table, axis=1)
-            table, right = table / sizes[:, None], values[rows] / sizes
-            cost = np.zeros(len(places) + 1)
-            cost[-1] = -1.0
-            found = linprog(
-                cost, np.hstack([-table, np.ones((len(rows), 1))]), right,
-                bounds=[(-reach, reach)] * len(places) + [(None, None)],
-            )  # fmt: skip
-            if found.x is None:
-                break
-            trial = best.copy()
-            trial[places] += found.x[:-1] * self.scales[places]
-            if self._least(trial, rows) > self._least(best, rows):
-                best = trial
-            else:
-                reach /= 4
-            if reach < 1e-4:
-                break
-        return best
-
-    def _reading(self, rattling: Sequence[int]) -> list[int]:
-        moving = set(rattling)
-        return [i for i in range(self.problem.inequalities) if moving & self.reads(i)]
-
     def reads(self, row: int) -> frozenset[int]:
         """Return the coordinates that a function depends on."""
         return reads(self.formulas, row)
-
-    def _least(self, q: "Array", rows: list[int]) -> float:
-        values, gradients = self.problem.evaluate(q, 1)
-        return float((values[rows] / np.linalg.norm(gradients[rows], axis=1)).min())
 
     # ------------------------------------------------------------------------------- the witness
 
@@ -292,12 +252,18 @@ class WitnessSearch:
         near = Fraction(1, 2 ** (bits // 2))
         simple = [x.limit_denominator(SIMPLE) for x in centre]
         centre = [y if abs(x - y) < near else x for x, y in zip(centre, simple, strict=True)]
+        best: BoundedMinimum | None = None
         reason: BoundedMinimum | Undecided = Undecided(SUBJECT, "nothing was tried")
         for witness in self._witnesses(supports, centre, lam, gauges, bits):
+            if best and witness.order == 2:
+                break
             reason = examine(self.problem, self.formulas, witness)
             if isinstance(reason, BoundedMinimum):
-                return reason
-        return reason
+                best = best or reason
+                # Only to first order, and without unions, a smaller box may say more.
+                if reason.alone or witness.order == 2 or self.problem.polyhedron.is_union:
+                    return reason
+        return best or reason
 
     def _gauges(self, supports: Sequence[int]) -> tuple[Gauge, ...]:
         """Return a section for each field, along one coordinate of the core."""
@@ -354,19 +320,13 @@ class WitnessSearch:
         about = Examination(self.problem, self.formulas, base)
         rattling = about.rattling
         if rattling:
-            q = self.roomy(np.array([float(x) for x in centre]), rattling)
-            for j in rattling:
-                centre[j] = Fraction(q[j])
-            room = self._rooms(q, rattling)
-            base = replace(base, centre=tuple(centre), inner=tuple(centre), room=room)
+            rattlers = Rattlers(self.problem, self.formulas, rattling)
+            centre, room = rattlers.placed(about.at_centre.hull)
+            if room is None:
+                return
+            base = replace(base, centre=centre, inner=centre, room=room)
         for order in (1, 2):
             yield from self._ordered(replace(base, order=order), bits)
-
-    def _rooms(self, q: "Array", rattling: Sequence[int]) -> dict[int, Fraction]:
-        """Return the half side of the room, the same for all coordinates of connected rattlers."""
-        rows = self._reading(rattling)
-        half = self._least(q, rows) if rows else 0.25
-        return {j: Fraction(half / 2) for j in rattling}
 
     def _ordered(self, base: Witness, bits: int) -> Iterator[Witness]:
         """Return witnesses for one of the lemmas, from wide boxes to narrow ones."""

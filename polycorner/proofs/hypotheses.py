@@ -1,6 +1,6 @@
 """Hypotheses of the theorem behind a proof, each decided on the enclosed solution of a claim."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
@@ -415,3 +415,19 @@ def _curved_on_cone(solved: Solved, outside: list[int]) -> ConditionResult:
     if positive_on_cone(linear.curvature, strong, slopes, scales):
         return proved(f"positive in all directions in which {', '.join(weak)} do not decrease")
     return undecided(f"not shown to be positive where {', '.join(weak)} do not decrease")
+
+
+def of_a_choice(
+    claim: Claim, closed: Sequence[int], found: Mapping[str, ConditionResult]
+) -> Mapping[str, ConditionResult]:
+    """Return what is known where a claim leaves out functions that may vanish at its point.
+
+    These may support a minimum as well, so that a condition that is violated refutes none.
+    """
+    if not closed:
+        return found
+    about = f"{', '.join(claim.named(closed))} may support as well, in another choice of functions"
+    return {
+        name: undecided(f"{result.reason}; {about}") if result.status is Status.FAILED else result
+        for name, result in found.items()
+    }

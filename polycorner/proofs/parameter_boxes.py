@@ -27,10 +27,12 @@ from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate, Problem
 from polycorner.progress import Progress, silent
 from polycorner.proofs.hypotheses import (
+    INACTIVE,
     Claim,
     ConditionResult,
     Status,
     check_hypotheses,
+    of_a_choice,
     without_enclosure,
 )
 from polycorner.proofs.kkt import Cell, Enclosure, enclose, newton
@@ -148,7 +150,12 @@ def _tried(
     if isinstance(enclosure, Undecided):
         cell = _cell(sides, without_enclosure(enclosure, symmetric=bool(claim.fields)), {})
     else:
-        cell = _cell(sides, check_hypotheses(claim, enclosure), _bounds(claim, enclosure))
+        found = check_hypotheses(claim, enclosure)
+        values = claim.system.formulas.values(enclosure.neighbourhood(), claim.others)
+        closed = [i for i, x in zip(claim.others, values, strict=True) if not (x > 0 or x < 0)]
+        # A function that is negative throughout refutes the claim, whatever supports.
+        found = of_a_choice(claim, closed, found) | {INACTIVE: found[INACTIVE]}
+        cell = _cell(sides, found, _bounds(claim, enclosure))
     if cell.status is not Status.UNDECIDED:
         return cell, []
     return cell, [_Waiting(half, centre, middle) for half in _halves(item.sides, whole)]

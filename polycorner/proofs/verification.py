@@ -50,7 +50,7 @@ from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, facts, titled, units
 from polycorner.progress import Progress, silent
 from polycorner.proofs.attempt import Attempt, Posed, attempt, bits_for, pose_claim
-from polycorner.proofs.bounded import BoundedMinimum
+from polycorner.proofs.bounded import SUBJECT, BoundedMinimum
 from polycorner.proofs.bounded_search import bounded_minimum
 from polycorner.proofs.hypotheses import SYMMETRIC, ConditionResult, Status
 from polycorner.proofs.invariance import Generator, generators
@@ -67,6 +67,7 @@ from polycorner.proofs.parameter_boxes import (
     summary,
     undecided_cell,
 )
+from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.values import Checked
 
 if TYPE_CHECKING:
@@ -77,6 +78,10 @@ SHOWN_CELLS = 5  # undecided cells listed in a table
 Bounds = tuple[Fraction, Fraction]
 MOST_DIGITS, MOST_CELLS = 10_000, 10_000_000
 LARGE = 20  # coordinates from which on faces of a corner with too many contacts are tried last
+MANY = (
+    "more contacts close than a choice of them shows; such corners are proved for given parameters"
+)
+ROOM, ROOM_DIGITS = "room", 6
 BOX_DIGITS = 3  # digits beyond those of the enclosures, for the box that contains them
 
 
@@ -117,6 +122,10 @@ class Proof(Checked, Printed):
     minimum : BoundedMinimum or None
         What a second statement says, where the first, that the point solves the KKT equations and
         is a strict minimum, is not shown: see :attr:`statement`.
+    room : mapping from str to (str, str)
+        Bounds of the coordinates that rattle, which neither the energy nor the active functions
+        read, in decimals rounded inwards.  With any values of them in this box the others are a
+        minimum as proved.
     """
 
     certificate: Certificate
@@ -131,6 +140,7 @@ class Proof(Checked, Printed):
     cells: tuple[ParameterCell, ...] = ()
     region: tuple[Bounds, ...] = field(default=(), repr=False)
     minimum: BoundedMinimum | None = field(default=None, repr=False)
+    room: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     @property
     def statement(self) -> str:
@@ -347,20 +357,14 @@ def prove(
     with precision(FIRST_BITS):
         formulas = Formulas(functions, d.manifold)
         check_unchanged(certificate, formulas)
-        many = not certificate.analysis.independent and problem.dimension > LARGE
-        if many and not sides:
-            found = _bounded(certificate, fields, formulas, digits)
-            if found is not None:
-                return found
-        tried = attempt(certificate, fields, formulas, DOUBLE_DIGITS if sides else digits)
         if not sides:
-            found = (
-                None if many or tried.settled else _bounded(certificate, fields, formulas, digits)
-            )
-            return found or _one(certificate, tried, digits)
+            return _at_once(certificate, fields, formulas, digits)
+        tried = attempt(certificate, fields, formulas, DOUBLE_DIGITS)
         moving = Formulas(functions, d.manifold, tuple(sides))
         check_domain(moving, sides)
         posed = pose_claim(certificate, tried.face, fields, moving, values)
+        if not (certificate.analysis.independent or tried.settled):
+            posed = Undecided(SUBJECT, MANY)
     if isinstance(posed, Undecided):
         cells: tuple[ParameterCell, ...] = (undecided_cell(sides, posed),)
     else:
@@ -368,6 +372,58 @@ def prove(
             posed.claim, posed.start, values, sides, max_cells=max_cells, progress=progress
         )
     return _many(certificate, replace(tried, posed=posed), sides, cells, digits)
+
+
+def _at_once(
+    certificate: Certificate, fields: Sequence[Generator], formulas: Formulas, digits: int
+) -> Proof:
+    """Return the proof for the parameters of the problem: the strict statement where it is shown.
+
+    Where gradients are dependent it rarely is, and the other one costs less.
+    """
+    many = not certificate.analysis.independent
+    found = _bounded(certificate, fields, formulas, digits) if many else None
+    if found is not None and certificate.problem.dimension > LARGE:
+        return found
+    tried = attempt(certificate, fields, formulas, digits, brief=found is not None)
+    if not many and not tried.settled:
+        found = _bounded(certificate, fields, formulas, digits)
+    if found is not None and not tried.proved:
+        return found
+    proof = _one(certificate, tried, digits)
+    return _with_room(proof, tried, formulas) if tried.proved else proof
+
+
+def _with_room(proof: Proof, tried: Attempt, formulas: Formulas) -> Proof:
+    """Return a proof with the room of the coordinates that nothing in it reads."""
+    problem = proof.certificate.problem
+    read = frozenset().union(*(reads(formulas, i) for i in (*tried.face, problem.rows - 1)))
+    loose = [j for j in range(problem.dimension) if j not in read]
+    if not loose:
+        return proof
+    with precision(tried.bits):
+        hull = [between(*side) for side in proof.region]
+        centre, sides = Rattlers(problem, formulas, loose).placed(hull)
+    return proof if sides is None else _roomy(proof, centre, sides)
+
+
+def _roomy(proof: Proof, centre: Sequence[Fraction], sides: Mapping[int, Fraction]) -> Proof:
+    manifold, scales = (
+        proof.certificate.problem.polyhedron.manifold,
+        proof.certificate.problem.scales,
+    )
+    room = {}
+    for j, side in sides.items():
+        half = side * Fraction(float(scales[j]))
+        ends = centre[j] - half, centre[j] + half
+        room[manifold.names[j]] = decimals(*ends, ROOM_DIGITS, inwards=True)
+    words = "; ".join(f"{name} from {a} to {b}" for name, (a, b) in room.items())
+    return replace(
+        proof,
+        conditions={**proof.conditions, ROOM: Status.PROVED},
+        reasons={**proof.reasons, ROOM: f"the others are a minimum with any values of {words}"},
+        room=room,
+    )
 
 
 def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
@@ -402,11 +458,11 @@ def _bounded(
     if isinstance(found, Undecided):
         return None
     names, rows = problem.polyhedron.manifold.names, problem.polyhedron.names
-    conditions = found.conditions(names, rows)
+    conditions = found.conditions(rows)
     region = found.region(found.radius, problem)
     sides = dict(zip(names, region, strict=True)) | {"energy": found.energy}
     alone = found.region(found.alone[1], problem) if found.alone else ()
-    return Proof(
+    proof = Proof(
         certificate,
         digits,
         tuple(rows[i] for i in found.witness.supports),
@@ -421,6 +477,8 @@ def _bounded(
         region=region,
         minimum=found,
     )
+    room = {j: found.witness.room[j] for j in found.rattling}
+    return _roomy(proof, found.witness.centre, room) if room else proof
 
 
 def _uniqueness_box(enclosure: Enclosure) -> list[Bounds]:

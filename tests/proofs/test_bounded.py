@@ -1,6 +1,6 @@
 """Minima between two energies, at corners with more contacts than balls can show to close."""
 
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -71,6 +71,41 @@ def test_a_circle_that_rattles_has_room():
     reads = [i for i, name in enumerate(polyhedron.names) if "5" in name]
     for _ in range(200):
         assert polyhedron.values(rng.uniform(low, high))[reads].min() > 0
+
+
+def test_the_room_is_nearly_as_large_as_it_can_be():
+    D, E, q = circles(SEVEN)
+    proof = prove(certify(D, E, q))
+    (low, high), names = zip(*map(proof.room.get, ("x5", "y5")), strict=True), [*proof.room]
+    assert names == ["x5", "y5"]
+    r, others = sp.Rational(proof.enclosures["r"][1]), [k for k in range(7) if k != 5]
+    walls, middles = sp.Interval(r, 1 - r), [[sp.Rational(x) for x in SEVEN[k]] for k in others]
+
+    def fits(more):
+        ends = [
+            (sp.Rational(a) - more * (sp.Rational(b) - sp.Rational(a)),
+             sp.Rational(b) + more * (sp.Rational(b) - sp.Rational(a)))
+            for a, b in zip(low, high, strict=True)
+        ]  # fmt: skip
+        apart = (
+            (x - a) ** 2 + (y - b) ** 2 > 4 * r**2 for x, y in product(*ends) for a, b in middles
+        )
+        return all(apart) and all(x in walls for end in ends for x in end)
+
+    assert fits(0)
+    assert not fits(sp.Rational(1, 8))
+
+
+def test_a_coordinate_that_nothing_reads_at_a_strict_minimum_has_room():
+    M = Manifold.euclidean("x z")
+    x, z = M.symbols
+    D = Polyhedron(M, {"floor": x, "low": z + x - 1, "high": 3 - z - x**2})
+    proof = prove(certify(D, x, [0.0, 1.7]))
+    assert proof.proved
+    assert proof.symmetry == ("d/dz",)
+    low, high = map(sp.Rational, proof.room["z"])
+    assert 1 < low < sp.Rational(11, 10)
+    assert sp.Rational(29, 10) < high < 3
 
 
 def test_translations_of_a_torus_are_factored_out():

@@ -13,7 +13,7 @@ from polycorner import Manifold, Polyhedron, SmoothFunction, certify, minimise
 from polycorner.dumbbells import DumbbellPair
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.proofs import prove
-from polycorner.proofs.hypotheses import INACTIVE, POSITIVE, SYMMETRIC, UNIQUE
+from polycorner.proofs.hypotheses import INACTIVE, POSITIVE, SYMMETRIC, UNIQUE, Status
 
 M = Manifold.euclidean("x y")
 x, y = M.symbols
@@ -275,3 +275,16 @@ def _face_multipliers(pair):
 
     names = ["A2B1", "A2b", "aB1"]
     return stationary_on(pair.polyhedron, pair.energy, pair.nested("R"), names).multipliers
+
+
+def test_no_cell_fails_on_which_other_functions_may_hold_the_point():
+    M = Manifold.euclidean("x y")
+    (x, y), b = M.symbols, sp.Symbol("b", real=True)
+    forms = {"floor": y, "left": x - b, "right": -x - b}
+    D = Polyhedron(M, [SmoothFunction(k, f, M, parameters={"b": -1.0}) for k, f in forms.items()])
+    # The origin is no minimum for b < 0, outside for b > 0, and alone on the floor for b = 0.
+    proof = prove(certify(D, y - x**2, [0.0, 0.0]), parameters={"b": (-1.0, 0.5)}, max_cells=60)
+    held = [c for c in proof.cells if c.parameters["b"][0] <= 0 <= c.parameters["b"][1]]
+    assert held
+    assert all(cell.status is Status.UNDECIDED for cell in held)
+    assert proof.failed_fraction > 0.9
