@@ -321,10 +321,10 @@ class WitnessSearch:
         rattling = about.rattling
         if rattling:
             rattlers = Rattlers(self.problem, self.formulas, rattling)
-            centre, room = rattlers.placed(about.at_centre.hull)
+            middle, room = rattlers.placed(about.at_centre.hull)
             if room is None:
                 return
-            base = replace(base, centre=centre, inner=centre, room=room)
+            base = replace(base, centre=middle, inner=middle, room=room)
         for order in (1, 2):
             yield from self._ordered(replace(base, order=order), bits)
 

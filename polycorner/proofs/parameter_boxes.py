@@ -154,8 +154,8 @@ def _tried(
         values = claim.system.formulas.values(enclosure.neighbourhood(), claim.others)
         closed = [i for i, x in zip(claim.others, values, strict=True) if not (x > 0 or x < 0)]
         # A function that is negative throughout refutes the claim, whatever supports.
-        found = of_a_choice(claim, closed, found) | {INACTIVE: found[INACTIVE]}
-        cell = _cell(sides, found, _bounds(claim, enclosure))
+        kept = {**of_a_choice(claim, closed, found), INACTIVE: found[INACTIVE]}
+        cell = _cell(sides, kept, _bounds(claim, enclosure))
     if cell.status is not Status.UNDECIDED:
         return cell, []
     return cell, [_Waiting(half, centre, middle) for half in _halves(item.sides, whole)]

@@ -87,7 +87,7 @@ class Rattlers:
                 break
         return best
 
-    def placed(self, hull: "list[Ball]") -> tuple[tuple[Fraction, ...], Room | None]:
+    def placed(self, hull: "Sequence[Ball]") -> tuple[tuple[Fraction, ...], Room | None]:
         """Return a centre and half sides of the room, in scale units, or None where none is shown.
 
         All sides grow alike first, then one after the other, while the functions that read these
