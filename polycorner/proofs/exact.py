@@ -4,7 +4,8 @@ A ball that contains 0 leaves a sign open at every precision where the number *i
 arguments show that it is:
 
 - *At a recognised point.*  Lattice reduction proposes every unknown of an enclosed solution as a
-  rational combination of 1 and the irrational constants of the formulas.  If these numbers lie in
+  rational combination of 1 and the irrational constants of the formulas, or of powers of one
+  unknown that is the root of a polynomial.  If these numbers lie in
   the box with exactly one solution and the KKT equations hold there identically, they are the
   solution, and functions may be evaluated at it.
 - *On the face.*  A function that is a combination of the functions held, with polynomials as
@@ -19,7 +20,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from polycorner.intervals.balls import exact, integer_relation
+import numpy as np
+
+from polycorner.intervals.balls import ball, exact, integer_relation
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.kkt import Enclosure
@@ -29,6 +32,7 @@ from polycorner.proofs.symbols import Symbols, constants, evaluate, opened
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
+MOST_POWERS = 4  # degree of a polynomial of which a coordinate may be a root
 MOST_CONSTANTS = 6  # irrational constants among which a number is sought
 # Sizes up to which Buchberger's algorithm is tried: symbols, degree, and terms of a polynomial.
 MOST_SYMBOLS, MOST_DEGREE, MOST_SUMMANDS = 6, 6, 40
@@ -72,7 +76,11 @@ def recognised(enclosure: Enclosure) -> ExactPoint | None:
     sought = constants(formulas, symbols)
     if len(sought) > MOST_CONSTANTS:
         return None
-    unknowns = [_combination(x, sought, symbols) for x in enclosure.solution]
+    unknowns = combinations(enclosure.solution, n, sought, symbols)
+    for gauge in system.gauges:
+        if sum(map(bool, gauge)) == 1:  # a coordinate that is held where it was
+            (j,) = np.flatnonzero(gauge)
+            unknowns[j] = algebra.number(Fraction(system.anchor[j]))
     known = tuple([p for p in unknowns if p is not None])
     if len(known) < len(unknowns):
         return None
@@ -120,6 +128,39 @@ def _stationary(
         if away:
             return False
     return True
+
+
+def combinations(
+    numbers: "Sequence[Ball]", n: int, sought: Sequence[Polynomial], symbols: Symbols
+) -> list[Polynomial | None]:
+    """Return rational combinations of 1 and constants that may be the numbers in balls.
+
+    Without constants, powers of one of the first ``n`` numbers are taken, if it is not rational: of
+    the first that may be a root of a polynomial of the highest degree.
+    """
+    found = [_combination(x, sought, symbols) for x in numbers]
+    if sought:
+        return found
+    powers: list[Polynomial] = []
+    for x, known in zip(numbers[:n], found, strict=False):
+        root = None if known is not None else _root(x, symbols)
+        if root and root[1] - 1 > len(powers):
+            powers = [root[0]]
+            while len(powers) < root[1] - 1:
+                powers.append(symbols.product(powers[-1], root[0]))
+    return [_combination(x, powers, symbols) for x in numbers] if powers else found
+
+
+def _root(x: "Ball", symbols: Symbols) -> tuple[Polynomial, int] | None:
+    """Return a root of a polynomial that is the number in a ball, perhaps, and the degree."""
+    powers = [ball(1), x]
+    for degree in range(2, MOST_POWERS + 1):
+        powers.append(powers[-1] * x)
+        relation = integer_relation(powers[::-1])
+        if relation is not None:
+            root = symbols.algebraic(relation[::-1], x)
+            return None if root is None else (root, degree)
+    return None
 
 
 def _combination(x: "Ball", sought: Sequence[Polynomial], symbols: Symbols) -> Polynomial | None:

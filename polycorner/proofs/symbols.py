@@ -1,18 +1,20 @@
 """Exact values: polynomials with rational coefficients in symbols that stand for numbers.
 
-Symbols are coordinates left open, pi, e, and operations whose result is not rational; equal
-operations on equal polynomials are one symbol.  Equal polynomials are equal numbers; nothing is
-concluded from polynomials that differ, but that one is less than another where enclosures show it.
+Symbols are coordinates left open, pi, e, roots of polynomials, and operations whose result is not
+rational; equal operations on equal polynomials are one symbol.  Equal polynomials are equal
+numbers; nothing is concluded from polynomials that differ, but that one is less than another where
+enclosures show it.
 """
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from math import isqrt
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Payload
-from polycorner.intervals.balls import ball, constant, operations
+from polycorner.intervals.balls import ball, constant, current_precision, exact, operations
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.polynomials import Polynomial, TooLargeError
@@ -52,11 +54,28 @@ class Symbols:
             self.keys.append(key)
         return {(self._index[key],): ONE}
 
+    def algebraic(self, coefficients: Sequence[int], near: "Ball") -> Polynomial | None:
+        """Return the symbol of the real root in a ball, if there is one and no other root is near.
+
+        Parameters
+        ----------
+        coefficients : sequence of int
+            Of the polynomial, the constant first; the last is not 0.
+        near : Ball
+        """
+        every = _roots(tuple(coefficients), current_precision())
+        alike = [x for x in every if x.real.overlaps(near)]
+        if len(alike) != 1 or alike[0].imag != 0 or not near.contains(alike[0].real):
+            return None
+        return self.of("root", tuple(coefficients), exact(near.mid()))
+
     def fixed(self, symbol: int) -> bool:
         """Whether a symbol stands for a number."""
         op, *args = self.keys[symbol]
         if op == "var":
             return args[0] in self.places
+        if op == "root":
+            return True
         return all(
             self.fixed(inner) for arg in args if op != "const" for m, _ in arg for inner in m
         )
@@ -73,6 +92,10 @@ class Symbols:
 
     def _number(self, symbol: int) -> "Ball":
         op, *args = self.keys[symbol]
+        if op == "root":
+            coefficients, near = args
+            real: list[Ball] = [x.real for x in _roots(coefficients, current_precision())]
+            return min(real, key=lambda x: abs(x - ball(near)).upper())
         if op in {"const", "var"}:
             return constant(args[0]) if op == "const" else self.places[args[0]]
         found: Ball = operations()[op](*(self.ball(dict(arg)) for arg in args))
@@ -90,24 +113,47 @@ class Symbols:
             return True
         return False if shown > 0 or (not or_zero and shown >= 0) else None
 
-    def root(self, symbol: int) -> Fraction | None:
-        """Return the number of which a symbol is the square root, if it is a rational one."""
+    def _square(self, symbol: int) -> tuple[int, Polynomial] | None:
+        """Return a power of a symbol that is a polynomial of a lower degree, and this polynomial.
+
+        A square root's square is what is under it; a root's highest power is given by its equation.
+        """
         op, *args = self.keys[symbol]
-        return algebra.constant(dict(args[0])) if op == "sqrt" else None
+        if op == "sqrt" and (inner := algebra.constant(dict(args[0]))) is not None:
+            return 2, algebra.number(inner)
+        if op == "root":
+            *low, top = args[0]
+            powers = {(symbol,) * k: Fraction(-c, top) for k, c in enumerate(low) if c}
+            return len(low), powers
+        return None
 
     def product(self, u: Polynomial, v: Polynomial) -> Polynomial:
-        """Return the product, in which squares of square roots are numbers."""
-        found: Polynomial = {}
-        for monomial, weight in algebra.product(u, v).items():
-            left, factor = list(monomial), weight
-            for symbol in set(monomial):
-                inner = self.root(symbol)
-                while inner is not None and left.count(symbol) > 1:
-                    left.remove(symbol)
-                    left.remove(symbol)
-                    factor *= inner
-            found = algebra.total([found, {tuple(left): factor}])
+        """Return the product, in which powers of roots are of the least degree."""
+        waiting, found = [algebra.product(u, v)], Polynomial()
+        while waiting:
+            for monomial, weight in waiting.pop().items():
+                for symbol in set(monomial):
+                    known = self._square(symbol)
+                    if known and monomial.count(symbol) >= known[0]:
+                        left = list(monomial)
+                        for _ in range(known[0]):
+                            left.remove(symbol)
+                        waiting.append(algebra.product({tuple(left): weight}, known[1]))
+                        break
+                else:
+                    found = algebra.total([found, {monomial: weight}])
         return found
+
+
+@lru_cache(maxsize=64)
+def _roots(coefficients: tuple[int, ...], bits: int) -> "list[Any]":
+    """Return enclosures of the roots of a polynomial, which are apart, at a precision."""
+    from flint import fmpz_poly
+
+    assert bits == current_precision()
+
+    found: Any = fmpz_poly(list(coefficients)).complex_roots()
+    return [root for root, _ in found]
 
 
 def evaluate(

@@ -19,19 +19,19 @@ SEVEN = [
 ]  # fmt: skip
 
 
-def circles(centres):
-    """Return the packings of equal circles in the unit square, and the point of given centres."""
+def circles(centres, side=1):
+    """Return the packings of equal circles in a square, and the point of given centres."""
     n = len(centres)
     manifold = Manifold.euclidean(" ".join(f"x{i} y{i}" for i in range(n)) + " r")
     *z, r = manifold.symbols
-    walls = {f"{s}low": s - r for s in z} | {f"{s}high": 1 - r - s for s in z}
+    walls = {f"{s}low": s - r for s in z} | {f"{s}high": side - r - s for s in z}
     gaps = {
         f"gap{i}_{j}": (z[2 * i] - z[2 * j]) ** 2 + (z[2 * i + 1] - z[2 * j + 1]) ** 2 - 4 * r**2
         for i, j in combinations(range(n), 2)
     }
     c = np.array(centres)
     apart = min(np.linalg.norm(a - b) for a, b in combinations(c, 2)) / 2
-    radius = min(apart, c.min(), (1 - c).min())
+    radius = min(apart, c.min(), (float(side) - c).min())
     return Polyhedron(manifold, {**walls, **gaps}), -r, np.append(c.ravel(), radius)
 
 
@@ -48,12 +48,18 @@ def test_four_circles_are_a_strict_minimum_by_exact_algebra():
     assert len(proof.active) == 12
 
 
-def test_five_circles_have_a_minimum_within_the_digits_that_are_asked_for():
-    r = (sp.sqrt(2) - 1) / 2
-    s = float(r)
-    proof = prove(certify(*circles([(s, s), (1 - s, s), (s, 1 - s), (1 - s, 1 - s), (0.5, 0.5)])))
+FIVE = [(-1, -1), (1, -1), (-1, 1), (1, 1), (0, 0)]  # of the square of centres
+
+
+@pytest.mark.parametrize("side", [sp.Integer(1), sp.sin(1)])
+def test_five_circles_are_a_minimum_and_strict_where_algebra_knows_the_side(side):
+    r = side * (sp.sqrt(2) - 1) / 2
+    places = [[float(side / 2 + k * (side / 2 - r)) for k in place] for place in FIVE]
+    proof = prove(certify(*circles(places, side)))
     assert proof.proved
-    assert proof.statement.startswith("a local minimum in the enclosed box")
+    strict = proof.statement == "strict local minimum"
+    assert strict == (side == 1)
+    assert strict or proof.statement.startswith("a local minimum in the enclosed box")
     low, high = energies(proof)
     assert low <= -r <= high
     assert high - low < sp.Rational(1, 10**29)

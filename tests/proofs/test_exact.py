@@ -18,7 +18,7 @@ from polycorner.proofs import prove
 from polycorner.proofs.definite import positive_on_cone
 from polycorner.proofs.exact import implied
 from polycorner.proofs.hypotheses import CURVED
-from polycorner.proofs.polynomials import number
+from polycorner.proofs.polynomials import number, total
 from polycorner.proofs.symbols import Symbols, evaluate
 
 M = Manifold.euclidean("x y z")
@@ -233,3 +233,24 @@ def test_infinite_derivatives_leave_a_proof_undecided_with_a_reason(case):
     assert not p.proved, str(p)
     assert all(p.reasons[name] for name, status in p.conditions.items() if status != "proved")
     assert "undecided" in str(p)
+
+
+def test_powers_of_a_root_are_reduced_by_its_equation():
+    symbols, one = Symbols(), number(1)
+    with precision(200):
+        root = symbols.algebraic((-2, 0, 0, 1), ball(2).root(3))
+        square = symbols.product(root, root)
+        # (1 + a + a^2) (a - 1) = a^3 - 1 = 1 for the cube root a of 2
+        sum_ = total([total([one, root]), square])
+        assert symbols.product(sum_, total([root, one], "sub")) == one
+        assert symbols.ball(square).overlaps(ball(4).root(3))
+        assert symbols.ball(square).rad() < 1e-50
+
+
+def test_a_root_is_one_number():
+    symbols = Symbols()
+    with precision(100):
+        both = ball(0, 2)  # the square roots of 2, and neither of those of -2
+        assert symbols.algebraic((-2, 0, 1), both) is None
+        assert symbols.algebraic((2, 0, 1), both) is None
+        assert symbols.algebraic((-2, 0, 1), ball(1.5)) is None
