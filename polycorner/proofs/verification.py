@@ -383,13 +383,16 @@ def _at_once(
     """
     many = not certificate.analysis.independent
     found = _bounded(certificate, fields, formulas, digits) if many else None
-    if found is not None and certificate.problem.dimension > LARGE:
+    if isinstance(found, Proof) and certificate.problem.dimension > LARGE:
         return found
-    tried = attempt(certificate, fields, formulas, digits, brief=found is not None)
+    tried = attempt(certificate, fields, formulas, digits, brief=isinstance(found, Proof))
     if not many and not tried.settled:
         found = _bounded(certificate, fields, formulas, digits)
-    if found is not None and not tried.proved:
+    if isinstance(found, Proof) and not tried.proved:
         return found
+    if isinstance(found, Undecided) and not tried.settled:
+        other = {SUBJECT: ConditionResult(Status.UNDECIDED, found.reason)}
+        tried = replace(tried, found={**tried.found, **other})
     proof = _one(certificate, tried, digits)
     return _with_room(proof, tried, formulas) if tried.proved else proof
 
@@ -451,12 +454,12 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
 
 def _bounded(
     certificate: Certificate, fields: Sequence[Generator], formulas: Formulas, digits: int
-) -> Proof | None:
-    """Return the proof of a minimum between two energies, or None."""
+) -> Proof | Undecided:
+    """Return the proof of a minimum between two energies, or why there is none."""
     problem, tolerances = certificate.problem, certificate.tolerances
     found = bounded_minimum(problem, formulas, certificate.point, fields, tolerances, digits)
     if isinstance(found, Undecided):
-        return None
+        return found
     names, rows = problem.polyhedron.manifold.names, problem.polyhedron.names
     conditions = found.conditions(rows)
     region = found.region(found.radius, problem)
