@@ -122,10 +122,14 @@ class Claim:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A claim and the enclosure of its solution, with the zeros that algebra shows there."""
+    """A claim and the enclosure of its solution, with the zeros that algebra shows there.
+
+    Nothing is asked of algebra for a claim that is refuted already.
+    """
 
     claim: Claim
     enclosure: Enclosure
+    refuted: bool = False
 
     @cached_property
     def exactly(self) -> ExactPoint | None:
@@ -145,6 +149,8 @@ class Solved:
 
     def vanishes(self, row: int) -> bool:
         """Whether a function that is defined at the solution is shown to be 0 there."""
+        if self.refuted:
+            return False
         formulas = self.claim.system.formulas
         known = self.exactly is not None and self.exactly.vanishes(formulas, row)
         return known or self.claim.implied(row)
@@ -298,9 +304,10 @@ def check_hypotheses(claim: Claim, enclosure: Enclosure) -> dict[str, ConditionR
     }
     if claim.fields:
         found[SYMMETRIC] = _symmetric(claim, enclosure)
-    solved = Solved(claim, enclosure)
+    positive = _positive(Solved(claim, enclosure))
+    solved = Solved(claim, enclosure, positive.status is Status.FAILED)
     return found | {
-        POSITIVE: _positive(solved),
+        POSITIVE: positive,
         INACTIVE: inside(solved),
         CURVED: _curved(solved),
     }

@@ -63,7 +63,8 @@ class Rattlers:
         scales = self.problem.scales[self.coordinates]
         table = gradients[self.rows][:, self.coordinates] * scales
         sizes = np.linalg.norm(table, axis=1)
-        return values[self.rows] / sizes, table / sizes[:, None]
+        steep = sizes > 0  # others, at their maximum here, stand in no way
+        return values[self.rows][steep] / sizes[steep], table[steep] / sizes[steep, None]
 
     def _middle(self, q: "Array") -> "Array":
         """Return a point at which the functions are as large as can be found."""
@@ -71,6 +72,8 @@ class Rattlers:
         cost = np.append(np.zeros(len(places)), -1.0)
         for _ in range(STEPS if self.rows else 0):
             distances, normals = self._distances(best)
+            if not len(distances):
+                break
             found = linprog(
                 cost, np.hstack([-normals, np.ones((len(normals), 1))]), distances,
                 bounds=[(-reach, reach)] * len(places) + [(None, None)],
@@ -79,7 +82,7 @@ class Rattlers:
                 break
             trial = best.copy()
             trial[places] += found.x[:-1] * self.problem.scales[places]
-            if self._distances(trial)[0].min() > distances.min():
+            if self._distances(trial)[0].min(initial=np.inf) > distances.min():
                 best = trial
             else:
                 reach /= 4
@@ -102,7 +105,7 @@ class Rattlers:
         centre = [exact(x.mid()) for x in hull]
         for j in self.coordinates:
             centre[j] = Fraction(q[j])
-        least = self._distances(q)[0].min() / FIRST if self.rows else 0.25
+        least = min(self._distances(q)[0].min(initial=np.inf), 1.0) / FIRST
         sides = dict.fromkeys(self.coordinates, Fraction(least))
 
         def free(factor: Fraction, places: Sequence[int], some: Sequence[int]) -> bool:

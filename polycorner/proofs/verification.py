@@ -45,7 +45,7 @@ from polycorner.intervals.balls import between, bounds, decimals, exact, precisi
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
-from polycorner.minimisation import Certificate
+from polycorner.minimisation import Certificate, Verdict
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, facts, titled, units
 from polycorner.progress import Progress, silent
@@ -379,13 +379,16 @@ def _at_once(
 ) -> Proof:
     """Return the proof for the parameters of the problem: the strict statement where it is shown.
 
-    Where gradients are dependent it rarely is, and the other one costs less.
+    Where gradients are dependent it rarely is, and the other one costs less; where no multipliers
+    carry the energy's slope neither is.
     """
     many = not certificate.analysis.independent
     found = _bounded(certificate, fields, formulas, digits) if many else None
     if isinstance(found, Proof) and certificate.problem.dimension > LARGE:
         return found
-    tried = attempt(certificate, fields, formulas, digits, brief=isinstance(found, Proof))
+    hopeless = many and certificate.verdict is Verdict.NOT_STATIONARY
+    brief = hopeless or isinstance(found, Proof)
+    tried = attempt(certificate, fields, formulas, digits, brief=brief)
     if not many and not tried.settled:
         found = _bounded(certificate, fields, formulas, digits)
     if isinstance(found, Proof) and not tried.proved:
