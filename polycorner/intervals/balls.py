@@ -150,6 +150,20 @@ def integer_relation(numbers: "Sequence[Ball]") -> list[int] | None:
     return None
 
 
+@lru_cache(maxsize=64)
+def roots(coefficients: tuple[int, ...], bits: int) -> "list[Any]":
+    """Return enclosures of the roots of a polynomial, which are apart; real ones are real.
+
+    The constant is the first coefficient.  The precision, which the caller has set, is part of what
+    is remembered.
+    """
+    from flint import fmpz_poly
+
+    assert bits == current_precision()
+    found: Any = fmpz_poly(list(coefficients)).complex_roots()
+    return [root for root, _ in found]
+
+
 def _bits(number: Fraction) -> int:
     return max(0, number.numerator.bit_length() - number.denominator.bit_length())
 

@@ -17,15 +17,8 @@ from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
 from polycorner.polyhedra.cones import independent_rows, unit_rows
-from polycorner.proofs.bounded import (
-    SUBJECT,
-    BoundedMinimum,
-    Examination,
-    Gauge,
-    UnshownError,
-    Witness,
-    examine,
-)
+from polycorner.proofs.bounded import SUBJECT, BoundedMinimum, examine
+from polycorner.proofs.growth import Examination, Gauge, UnshownError, Witness
 from polycorner.proofs.invariance import Generator, generators, translations
 from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.tolerances import Tolerances

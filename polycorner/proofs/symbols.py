@@ -8,13 +8,12 @@ enclosures show it.
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from functools import lru_cache
 from math import isqrt
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Payload
-from polycorner.intervals.balls import ball, constant, current_precision, exact, operations
+from polycorner.intervals.balls import ball, constant, current_precision, exact, operations, roots
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.polynomials import Polynomial, TooLargeError
@@ -63,7 +62,7 @@ class Symbols:
             Of the polynomial, the constant first; the last is not 0.
         near : Ball
         """
-        every = _roots(tuple(coefficients), current_precision())
+        every = roots(tuple(coefficients), current_precision())
         alike = [x for x in every if x.real.overlaps(near)]
         if len(alike) != 1 or alike[0].imag != 0 or not near.contains(alike[0].real):
             return None
@@ -94,7 +93,7 @@ class Symbols:
         op, *args = self.keys[symbol]
         if op == "root":
             coefficients, near = args
-            real: list[Ball] = [x.real for x in _roots(coefficients, current_precision())]
+            real: list[Ball] = [x.real for x in roots(coefficients, current_precision())]
             return min(real, key=lambda x: abs(x - ball(near)).upper())
         if op in {"const", "var"}:
             return constant(args[0]) if op == "const" else self.places[args[0]]
@@ -143,17 +142,6 @@ class Symbols:
                 else:
                     found = algebra.total([found, {monomial: weight}])
         return found
-
-
-@lru_cache(maxsize=64)
-def _roots(coefficients: tuple[int, ...], bits: int) -> "list[Any]":
-    """Return enclosures of the roots of a polynomial, which are apart, at a precision."""
-    from flint import fmpz_poly
-
-    assert bits == current_precision()
-
-    found: Any = fmpz_poly(list(coefficients)).complex_roots()
-    return [root for root, _ in found]
 
 
 def evaluate(
