@@ -14,7 +14,7 @@ from .minimisation import (
 )
 from .motion import Friction, State, System, Trajectory, simulate, velocities
 from .polyhedra import AllOf, AnyOf, Polyhedron, Stratum, Symmetry, stratum_at
-from .proofs import Proof, prove
+from .proofs import Membership, Proof, exact_point, prove
 from .skeletons import Skeleton, skeleton
 from .spaces import Manifold
 
@@ -26,6 +26,7 @@ __all__ = [
     "Entrapment",
     "Friction",
     "Manifold",
+    "Membership",
     "Minima",
     "NonsmoothWarning",
     "PolycornerError",
@@ -42,6 +43,7 @@ __all__ = [
     "Trajectory",
     "Verdict",
     "certify",
+    "exact_point",
     "minima",
     "minimise",
     "prove",

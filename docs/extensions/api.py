@@ -79,11 +79,11 @@ GROUPS = (
     ),
     Group(
         "Prove and list",
-        "Theorems in ball arithmetic: of one minimum, of all stationary points, of all corners.",
+        "Theorems in ball arithmetic: of points, minima, all stationary points, all corners.",
         {
-            "": "prove Proof",
-            "proofs": "ParameterCell Status StationaryList StationaryLocus StationaryPoint "
-            "stationary_points CornerList CornerPoint corners",
+            "": "exact_point Membership prove Proof",
+            "proofs": "Violation ParameterCell Status StationaryList StationaryLocus "
+            "StationaryPoint stationary_points CornerList CornerPoint corners",
         },
     ),
     Group(
@@ -146,10 +146,11 @@ GROUPS = (
     ),
     Group(
         "Save and load",
-        "Certificates, skeletons, graphs and trajectories in files.",
+        "Problems, certificates, skeletons, graphs and trajectories in files.",
         {
-            "files": "save_certificate load_certificate save_skeleton load_skeleton "
-            "save_trajectory load_trajectory skeleton_graph save_graph load_graph",
+            "files": "ProblemFile save_problem load_problem save_certificate load_certificate "
+            "save_skeleton load_skeleton save_trajectory load_trajectory skeleton_graph "
+            "save_graph load_graph",
         },
     ),
     Group(

@@ -1,4 +1,4 @@
-"""Certificates, skeletons and trajectories as files."""
+"""Certificates, problems, skeletons and trajectories as files."""
 
 import lazy_loader
 

@@ -216,7 +216,8 @@ def _is_huge(base: "sympy.Expr", exponent: "sympy.Expr") -> bool:
     if not exponent.is_Number:
         return False
     coefficient = base.as_coeff_Mul()[0] if base.is_Mul else base
-    size = 0 if abs(coefficient) == 1 else _bits(coefficient)
+    size = _bits(coefficient)
+    size = 0 if size == 1 and abs(coefficient) == 1 else size
     return bool(abs(exponent) > sys.float_info.max or size * abs(exponent) > BITS)
 
 

@@ -125,6 +125,20 @@ def middle_inverse(rows: "Sequence[Sequence[Ball]]") -> "Matrix | None":
         return None
 
 
+def solve_exactly(
+    rows: "Sequence[Sequence[Fraction]]", right: "Sequence[Fraction]"
+) -> list[Fraction] | None:
+    """Return the solution of linear equations in fractions, or None where they are singular."""
+    from flint import fmpq_mat
+
+    left = fmpq_mat([[_plain(x) for x in row] for row in rows])
+    try:
+        found = left.solve(fmpq_mat([[_plain(x)] for x in right]))
+    except ZeroDivisionError:
+        return None
+    return [Fraction(int(x.p), int(x.q)) for x in found.entries()]
+
+
 def dot(u: "Sequence[Any]", v: "Sequence[Any]") -> Ball:
     """Return the sum of products."""
     return sum((a * b for a, b in zip(u, v, strict=True)), ball(0))

@@ -41,7 +41,7 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner import checks
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.intervals.balls import between, bounds, decimals, exact, precision
+from polycorner.intervals.balls import ball, between, bounds, decimals, exact, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
@@ -75,6 +75,7 @@ if TYPE_CHECKING:
 
 DOUBLE_DIGITS = 17  # of a floating-point number, which bounds over a box of parameters are
 SHOWN_CELLS = 5  # undecided cells listed in a table
+SHOWN_FUNCTIONS, SHOWN_DIGITS = 3, 3  # of those that the given point violates
 Bounds = tuple[Fraction, Fraction]
 MOST_DIGITS, MOST_CELLS = 10_000, 10_000_000
 LARGE = 20  # coordinates from which on faces of a corner with too many contacts are tried last
@@ -126,6 +127,11 @@ class Proof(Checked, Printed):
         Bounds of the coordinates that rattle, which neither the energy nor the active functions
         read, in decimals rounded inwards.  With any values of them in this box the others are a
         minimum as proved.
+    outside : mapping from str to str
+        Functions that are negative at the certificate's point itself, as the exact number that its
+        floating-point coordinates are, and equations that do not vanish there, with their values;
+        empty where it lies in the set.  What is proved concerns a point beside it;
+        :func:`~polycorner.proofs.exact_point` repairs such points.
     """
 
     certificate: Certificate
@@ -141,6 +147,7 @@ class Proof(Checked, Printed):
     region: tuple[Bounds, ...] = field(default=(), repr=False)
     minimum: BoundedMinimum | None = field(default=None, repr=False)
     room: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    outside: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     @property
     def statement(self) -> str:
@@ -257,6 +264,7 @@ class Proof(Checked, Printed):
                 facts(
                     (
                         ("verdict", verdict),
+                        *self._outside_facts(),
                         ("active", ", ".join(self.active) or "none"),
                         *((k, f"{v}: {self.reasons[k]}") for k, v in self.conditions.items()),
                         *self._parameter_facts(),
@@ -266,6 +274,13 @@ class Proof(Checked, Printed):
                 units(manifold.periods) if self.enclosures else "",
             ),
         )
+
+    def _outside_facts(self) -> Iterator[tuple[str, str]]:
+        worst = sorted(self.outside.items(), key=lambda item: -abs(float(item[1])))
+        if worst:
+            most = ", ".join(f"{name} is {value}" for name, value in worst[:SHOWN_FUNCTIONS])
+            more = f" and {len(worst) - SHOWN_FUNCTIONS} more" if worst[SHOWN_FUNCTIONS:] else ""
+            yield "given point", f"not in the set: {most}{more}"
 
     def _parameter_facts(self) -> Iterator[tuple[str, str]]:
         if not self.parameters:
@@ -358,7 +373,8 @@ def prove(
         formulas = Formulas(functions, d.manifold)
         check_unchanged(certificate, formulas)
         if not sides:
-            return _at_once(certificate, fields, formulas, digits)
+            found = _at_once(certificate, fields, formulas, digits)
+            return replace(found, outside=_outside(certificate, formulas))
         tried = attempt(certificate, fields, formulas, DOUBLE_DIGITS)
         moving = Formulas(functions, d.manifold, tuple(sides))
         check_domain(moving, sides)
@@ -398,6 +414,18 @@ def _at_once(
         tried = replace(tried, found={**tried.found, **other})
     proof = _one(certificate, tried, digits)
     return _with_room(proof, tried, formulas) if tried.proved else proof
+
+
+def _outside(certificate: Certificate, formulas: Formulas) -> dict[str, str]:
+    """Return what the certificate's point violates, taken exactly."""
+    d, m = certificate.problem.polyhedron, certificate.problem.inequalities
+    point = Box([ball(x) for x in certificate.point.tolist()])
+    values = formulas.values(point, range(m + len(d.equations)))
+    broken = [i for i, value in enumerate(values) if (value < 0 if i < m else value != 0)]
+    signs = [-1 if i in broken else 1 for i in range(m)]
+    if broken and broken[-1] < m and d.signs_to_pieces(signs):
+        return {}  # another branch holds
+    return {formulas.names[i]: values[i].str(SHOWN_DIGITS, radius=False) for i in broken}
 
 
 def _with_room(proof: Proof, tried: Attempt, formulas: Formulas) -> Proof:
