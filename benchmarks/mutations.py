@@ -78,7 +78,7 @@ proofs/lists/directions.py: UNIT * size - TINY => UNIT * size + 2 * TINY
 models/wells/escape.py: -near[:-1] / (far => near[:-1] / (far
 models/disks/critical_points.py: bool(fewest < index or not => bool(not
 [pictures/solids]
-pictures/solids/edge_collapse.py: free | (lengths < COINCIDENT) => free
+pictures/solids/edge_collapse.py: free | (lengths < DEFAULT.same) => free
 [dumbbells/test_pair_energy.py dumbbells/test_drum_formulas.py dumbbells/test_symmetries.py]
 dumbbells/formulas.py: sympy.sin(theta) / (2 * rho)) ** 2) => sympy.sin(theta) / rho) ** 2)
 dumbbells/drum_formulas.py: sign * (r - t)) / 2 => sign * (r + t)) / 2

@@ -37,7 +37,7 @@ from polycorner.dumbbells.viewer import descent, film_page, live_application, se
 from polycorner.dumbbells.viewer.server import bound
 from polycorner.models import Tutorial
 from polycorner.pictures import draw_region, save
-from polycorner.skeletons.refinement import traced
+from polycorner.skeletons.search import traced
 
 IMAGES = Path(__file__).parent / "images"
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)

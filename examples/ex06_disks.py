@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.models.disks.disks import TorusDisks
+from polycorner.models import TorusDisks
 
 # Number of labelled copies, modulo translations, of each configuration of three disks there.
 COPIES = (2, 6, 6)

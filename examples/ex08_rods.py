@@ -19,8 +19,14 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.dumbbells import DumbbellPair, PairAtlas, long_rod_length, pair_atlas
-from polycorner.dumbbells.statics.skeleton_map import PairMap, pair_map
+from polycorner.dumbbells import (
+    DumbbellPair,
+    PairAtlas,
+    PairMap,
+    long_rod_length,
+    pair_atlas,
+    pair_map,
+)
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5)
 LENGTHS, RODS = np.linspace(2, 5, 4), np.linspace(0.1, 0.9, 3)

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from polycorner import Skeleton, skeleton
-from polycorner.models.spheres import SphereCluster
+from polycorner.models import SphereCluster
 
 MODEL = SphereCluster(6)
 

@@ -23,14 +23,16 @@ from pathlib import Path
 import sympy
 
 from polycorner import Certificate, minimise, stationary_on
-from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.statics.critical import (
+from polycorner.dumbbells import (
+    DumbbellPair,
+    ErrorBar,
     critical_length,
     critical_rod_radius,
-    escape_barrier,
+    heading_error_bar,
+    pair_sensitivity,
     plane_critical_formula,
 )
-from polycorner.dumbbells.statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
+from polycorner.dumbbells.statics.critical import escape_barrier
 from polycorner.dumbbells.statics.minima import CORNER
 
 PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)

@@ -22,7 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.dumbbells.statics.keel import Keel, Turning, exact_eastern_boundary
+from polycorner.dumbbells import Keel
+from polycorner.dumbbells.statics.keel import Turning, exact_eastern_boundary
 
 # Static coefficients from the paper's text; it does not give the dynamic ones.
 KEEL = Keel(math.radians(7), rolling=0.1, sliding=0.3, rolling_dynamic=0.05, sliding_dynamic=0.2)

@@ -20,10 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
+from polycorner import Trajectory, simulate
 from polycorner.models.textbook import GRAVITY, bouncing_ball
-from polycorner.motion.events import EventKind
-from polycorner.motion.simulation import simulate
-from polycorner.motion.trajectory import Trajectory
+from polycorner.motion import EventKind
 
 RESTITUTION, HEIGHT = 0.7, 1.0
 FALL = math.sqrt(2 * HEIGHT / GRAVITY)

@@ -23,12 +23,10 @@ from pathlib import Path
 
 import numpy as np
 
+from polycorner import Trajectory, simulate
 from polycorner.models.textbook import GRAVITY, ball_on_plane, sliding_block
-from polycorner.motion.events import EventKind
-from polycorner.motion.friction import Disc
-from polycorner.motion.simulation import simulate
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
+from polycorner.motion import Disc, EventKind
+from polycorner.toolkit import Array
 
 SLIDING, ROLLING = 0.2, 0.02
 PUSH = (3.0, 1.0)  # m/s, without spin

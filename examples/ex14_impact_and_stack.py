@@ -21,13 +21,11 @@ from pathlib import Path
 
 import numpy as np
 
+from polycorner import System, Trajectory, simulate
 from polycorner.models.supports import stack, table
 from polycorner.models.textbook import GRAVITY, box_on_plane, row_of_balls
-from polycorner.motion.friction import Disc, Interval
-from polycorner.motion.simulation import simulate
-from polycorner.motion.system import System
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
+from polycorner.motion import Disc, Interval
+from polycorner.toolkit import Array
 
 HALF_WIDTH, HALF_HEIGHT, TILT = 0.35, 1.0, 0.25
 SLENDER = math.atan(HALF_WIDTH / HALF_HEIGHT)

@@ -17,10 +17,10 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from polycorner.dumbbells.drum import DumbbellDrum
+from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads
 from polycorner.dumbbells.dynamics.singles import Zigzag, follow, onset_azimuths, zigzags
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 DRUM = DumbbellDrum(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 HEADING = math.radians(8)  # near the minimum of the energy of the pair, 7.94 degrees

@@ -77,7 +77,7 @@ from networkx.algorithms.isomorphism import GraphMatcher
 from polycorner import Manifold, Polyhedron
 from polycorner.models import SphereCluster
 from polycorner.proofs import CornerList, corners
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 TOUCH = 2  # the square of the diameter
 TETRAHEDRON = [sympy.Matrix(p) for p in ([0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1])]

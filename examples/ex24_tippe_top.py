@@ -37,7 +37,7 @@ from scipy.optimize import brentq
 from polycorner import System, Trajectory, simulate, velocities
 from polycorner.bodies import Arrangement, HalfSpace, Mass, sphere
 from polycorner.motion import angular_velocity
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

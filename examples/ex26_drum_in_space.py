@@ -29,7 +29,7 @@ from polycorner.dumbbells import DumbbellDrum, RigidDumbbells
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads
 from polycorner.dumbbells.dynamics.singles import onset_azimuths
 from polycorner.dumbbells.dynamics.starts import nested_pair
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 DRUM = DumbbellDrum(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 HEADINGS = (-25.0, -8.0, 0.0, 8.0, 20.0)  # degrees

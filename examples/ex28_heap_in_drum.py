@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 
+from polycorner import Trajectory
 from polycorner.bodies import Arrangement, Cylinder, disc
 from polycorner.motion import Solver, simulate
-from polycorner.motion.trajectory import Trajectory
-from polycorner.spaces.manifold import Array
+from polycorner.toolkit import Array
 
 COUNT, GRAVITY, FRICTION, SPIN = 600, 981.0, 0.5, 1.5  # of discs of radius 1 cm; rad/s
 DRUM = math.sqrt(COUNT / 0.42)  # radius of the drum, in cm: it is half full

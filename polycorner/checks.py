@@ -140,14 +140,7 @@ def real(
     Traceback (most recent call last):
     ValueError: dt: expected a number > 0 in s; got -1.0
     """
-    bounds = _bounds((">", above), (">=", least), ("<", below), ("<=", most))
-    expected = f"a {'' if infinite or bounds else 'finite '}number{bounds}{unit and f' in {unit}'}"
-    if isinstance(value, bool) or not isinstance(value, Real):
-        refuse(argument, expected, value, TypeError)
-    try:
-        number = float(value)
-    except OverflowError:
-        refuse(argument, f"{expected} in the range of doubles", value)
+    number, known = _as_double(value)
     inside = (
         (above is None or number > above)
         and (least is None or number >= least)
@@ -155,11 +148,26 @@ def real(
         and (most is None or number <= most)
         and (infinite or math.isfinite(number))
     )
-    if not inside and math.isinf(number) and most is None and below is None:
+    if inside and not math.isnan(number):
+        return number
+    bounds = _bounds((">", above), (">=", least), ("<", below), ("<=", most))  # for the error alone
+    expected = f"a {'' if infinite or bounds else 'finite '}number{bounds}{unit and f' in {unit}'}"
+    if isinstance(value, bool) or not isinstance(value, Real):
+        refuse(argument, expected, value, TypeError)
+    if not known:
+        refuse(argument, f"{expected} in the range of doubles", value)
+    if math.isinf(number) and most is None and below is None:
         refuse(argument, expected.replace("a number", "a finite number"), value)
-    if not inside or math.isnan(number):
-        refuse(argument, expected, value)
-    return number
+    refuse(argument, expected, value)
+
+
+def _as_double(value: object) -> tuple[float, bool]:
+    """Return a real number as a double, NaN for what is none, and whether it is in its range."""
+    try:
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        return (float(value) if number else math.nan), True  # type: ignore[arg-type] # a Real
+    except OverflowError:
+        return math.nan, False
 
 
 def flag(argument: str, value: object) -> bool:

@@ -173,6 +173,4 @@ class SearchOptions:
 
 
 DEFAULT = Tolerances()
-STRICT = Tolerances.of(1e-10)
-MEASURED = Tolerances.of(1e-5)
 SEARCH = SearchOptions()

@@ -45,7 +45,7 @@ class Value:
         """Make the arrays among the attributes read-only."""
         own = vars(self)
         for name, value in own.items():
-            if isinstance(value, HOLDERS):
+            if type(value) not in PLAIN and isinstance(value, HOLDERS):
                 own[name] = read_only(value)
 
     def __getstate__(self) -> dict[str, Any]:

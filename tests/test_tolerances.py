@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.tolerances import DEFAULT, MEASURED, STRICT, Tolerances
+from polycorner.tolerances import DEFAULT, Tolerances
 
 EPSILON = sys.float_info.epsilon
 exponents = st.floats(-10, -4)
@@ -54,11 +54,6 @@ def test_the_rank_tolerance_moves_what_is_dependent_and_nothing_else(exponent):
     assert t.dependent == pytest.approx(t.rank / 10)
     others = [f.name for f in fields(t) if f.name not in ("rank", "dependent")]
     assert all(getattr(t, name) == getattr(DEFAULT, name) for name in others)
-
-
-def test_the_presets_differ_from_the_default_in_the_tolerance():
-    assert STRICT == Tolerances.of(1e-10)
-    assert MEASURED == Tolerances.of(1e-5)
 
 
 @pytest.mark.parametrize("argument", ["tolerance", "rank_tolerance"])

@@ -150,7 +150,7 @@ def _planar(search: SkeletonSearch, model: "Tutorial | Pinball") -> None:
         import numpy as np
 
         from polycorner.pictures import regions, style
-        from polycorner.skeletons.refinement import traced
+        from polycorner.skeletons.search import traced
 
         curves = [traced(found, edge) for edge in found.edges]
         low, high = np.vstack(curves).min(axis=0), np.vstack(curves).max(axis=0)

@@ -71,10 +71,10 @@ class _Batch:
         self.parameters = np.array(numbers)
         self.period = len(numbers)
         self.address = self.parameters.ctypes.data  # of an array that this value keeps alive
-        self.reads = np.array([call.reads for call in calls])
         everything = first.columns == tuple(range(len(first.family.names)))
-        self.columns: Any = np.s_[:] if everything else list(first.columns)
-        rows, reads = np.array([call.rows for call in calls]), self.reads
+        self.columns: Any = None if everything else list(first.columns)
+        rows, reads = np.array([call.rows for call in calls]), np.array([c.reads for c in calls])
+        self.reads: Any = reads
         self.places: tuple[tuple[Any, ...], ...] = (
             (..., rows),
             (..., rows[:, :, None], reads[:, None, :]),
@@ -82,19 +82,24 @@ class _Batch:
         )
         row, read = _run(first.rows), _run(first.reads)
         if len(calls) == 1 and row is not None and read is not None:  # a block, copied as one
-            self.places = (..., None, row), (..., None, row, read), (..., None, row, read, read)
+            self.reads = read
+            self.places = (..., row), (..., row, read), (..., row, read, read)
 
     def scatter(self, q: Array, results: tuple[Array, ...]) -> None:
         """Evaluate at the point or points ``q`` ``(..., n)`` and scatter the results."""
-        order, outer = len(results) - 1, (*q.shape[:-1], len(self.reads))
-        if outer == (1,):
-            parts = self.kernel.at(q[self.reads[0]], self.address, order)
+        order, inputs = len(results) - 1, q[..., self.reads]
+        outer, variables = inputs.shape[:-1], inputs.shape[-1]
+        if not outer or outer == (1,):
+            parts = self.kernel.at(inputs.reshape(variables), self.address, order)
         else:
-            inputs = q[..., self.reads].reshape(-1, self.reads.shape[1])
-            parts = self.kernel.over(inputs, self.address, order, self.period)
+            parts = self.kernel.over(
+                inputs.reshape(-1, variables), self.address, order, self.period
+            )
         for k, (result, part, place) in enumerate(zip(results, parts, self.places, strict=False)):
             block = part.reshape(*outer, *part.shape[-1 - k :])
-            result[place] = block[(..., self.columns, *(np.s_[:],) * k)]
+            if self.columns is not None:
+                block = block[(..., self.columns, *(np.s_[:],) * k)]
+            result[place] = block
 
 
 class Bundle(Value):

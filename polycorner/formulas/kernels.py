@@ -161,12 +161,12 @@ class CompiledKernel:
         Few points, and points with parameters of their own, are evaluated one by one: code for
         lanes is compiled when it is first worth it.  The results are the same to the last bit.
         """
-        addresses = [*(output.ctypes.data for output in outputs), None, None][:3]
+        addresses = [*(address(output) if output.size else None for output in outputs), None, None]
         lanes = self._lanes if period == 1 and len(q) >= MANY else None
         if lanes is None:
-            self._rows(len(q), period, q.ctypes.data, parameters, *addresses)
+            self._rows(len(q), period, q.ctypes.data, parameters, *addresses[:3])
         else:
-            lanes[1](len(q), q.ctypes.data, parameters, *addresses)
+            lanes[1](len(q), q.ctypes.data, parameters, *addresses[:3])
 
 
 def address(array: Array) -> int:

@@ -2,8 +2,7 @@ from .abundance import Richness, richness
 from .certificate import Certificate, Condition, Residuals, certify
 from .immobility import Immobility, Mobility, immobility
 from .methods import minimise, stationary_on
-from .multistart import minima
-from .outcomes import Minima
+from .multistart import Minima, minima
 from .problem import Problem
 from .sensitivities import Crossing, Sensitivity, crossing, sensitivity
 from .verdicts import Entrapment, Verdict

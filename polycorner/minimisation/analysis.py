@@ -88,6 +88,7 @@ def corner(local: Local, active: tuple[int, ...]) -> Local | None:
 
 def seen_from(a: Analysis, exact: Analysis) -> Analysis:
     """Return the analysis of a point as that of the exact corner beside it."""
+    # Within the tolerance both may be true: neither verdict would be evidence.
     if exact.verdict in {Verdict.NOT_STATIONARY, Verdict.NO_MULTIPLIER}:
         reason = "the exact corner of the active functions beside it is not stationary"
         return replace(a, decision=undecided(len(a.local.point), reason))
@@ -143,6 +144,7 @@ def _without_conditions(local: Local, verdict: Verdict, reason: str) -> Analysis
     )
     known = {"gradients": gradients, "hessians": hessians, "slope": gradients[-1]}
     finite = replace(local, **known, higher="none")
+    # What an analysis holds beside its verdict, as far as derivatives are finite.
     found = _analyse_piece(finite, frozenset())
     return replace(found, verdict=verdict, obstacle=reason, local=local)
 
@@ -155,20 +157,23 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
     active = tuple(sorted(piece))
     k, small = len(active), local.small
     numbers = [*active, *local.sections]
-    gradients = local.gradients[numbers]
-    blind = _blind(local, active)
+    gradients, hessians = local.gradients[numbers], local.hessians[numbers]
+    blind = _blind(gradients, hessians, local.tolerances.zero)
     seen = [i for i in range(len(gradients)) if i not in blind]
     kept = sum(1 for i in seen if i < k)
     rows = Rows(gradients[seen] if blind else gradients, local.tolerances.rank)
+    # Functions that vanish at the corner together may be dependent there, and not here.
     level = unresolved(local, [numbers[i] for i in seen], rows)
     if level:
         exact = None if settled else corner(local, active)
         if exact is not None:
             return _analyse_piece(exact, piece, settled=True)
         sizes = np.linalg.norm(gradients[seen], axis=1)
+        # As if they were dependent exactly: multipliers are then those of the corner.
         gradients[seen] = rows.truncated(level) * sizes[:, None]
         rows = Rows(gradients[seen], local.tolerances.rank)
     slope = local.slope
+    # Gradients that are dependent up to the tolerance have multipliers of up to slope / tolerance.
     most = 0.1 * float(np.linalg.norm(slope)) / local.tolerances.rank + small
     multipliers = find_multipliers(rows, kept, slope, small, most, local.tolerances.dependent)
     left = slope - multipliers.values @ rows.units
@@ -177,7 +182,7 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
     strong = [i for i in seen if i >= k or abs(values[i]) > small]
     weak = tuple(active[i] for i in seen if i < k and abs(values[i]) <= small)
     face = rows if len(strong) == len(seen) else Rows(gradients[strong], local.tolerances.rank)
-    hessian = _hessian_with(local, numbers, gradients, multipliers.values)
+    hessian = local.hessians[-1] - _combined(hessians, gradients, multipliers.values)
     small_curvature = local.tolerances.curvature * max(local.reference, float(abs(hessian).max()))
     weak_rows = local.gradients[list(weak)]
     reach = local.tolerances.zero / 10
@@ -222,7 +227,7 @@ def _analyse_piece(local: Local, piece: Piece, *, settled: bool = False) -> Anal
     return result
 
 
-def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:
+def _blind(gradients: Array, hessians: Array, zero: float) -> tuple[int, ...]:
     """Return positions of functions whose gradients vanish, as far as the point is known.
 
     A function that vanishes to order ``p >= 2`` at a distance ``d`` from the point has
@@ -230,10 +235,9 @@ def _blind(local: Local, active: tuple[int, ...]) -> tuple[int, ...]:
     tolerance only if the second quotient is at most twice the tolerance.  Its gradient says
     nothing about the set, and a multiplier of it nothing about the energy.
     """
-    numbers = [*active, *local.sections]
-    sizes = abs(local.gradients[numbers]).max(axis=1, initial=0.0)
-    bends = abs(local.hessians[numbers]).max(axis=(1, 2), initial=0.0)
-    return tuple(np.flatnonzero(sizes <= OPEN * local.tolerances.zero * bends).tolist())
+    sizes = abs(gradients).max(axis=1, initial=0.0)
+    bends = abs(hessians).max(axis=(1, 2), initial=0.0)
+    return tuple((sizes <= OPEN * zero * bends).nonzero()[0].tolist())
 
 
 def _with_blind(a: Analysis) -> Analysis:
@@ -280,9 +284,11 @@ def _decide(a: Analysis, piece: Piece, strong: list[int], hessian: Array) -> Dec
         if not without(flat, still).shape[1]:
             return symmetric(flat)
     held, values, exact = strong, a.multipliers.values, not a.blind
+    # A series on the face needs independent functions: those of a basic solution are taken.
     if rank(a.gradients[strong], local.tolerances.rank) < len(strong):
         held, values = _basic_multipliers(a, strong)
-        hessian, exact = _hessian_with(local, numbers, a.gradients, values), False
+        bent = _combined(local.hessians[numbers], a.gradients, values)
+        hessian, exact = local.hessians[-1] - bent, False
         tangent = Rows(a.gradients[held], local.tolerances.rank).null_space
         curvature = find_curvature(hessian, tangent, local.gradients[[]], a.small_curvature)
         left = abs(local.slope - values @ unit_rows(a.gradients)).max()
@@ -336,15 +342,17 @@ def _basic_multipliers(a: Analysis, strong: list[int]) -> tuple[list[int], Array
     used = [i for i, share in zip(others, shares, strict=True) if share > 0]
     used += sorted(equations[i] for i in chosen)
     values = np.zeros(len(units))
+    # Once more for the chosen ones together: the programme along the equations had none for these.
     values[used] = np.linalg.lstsq(units[used].T, slope, rcond=None)[0]
     return used, values
 
 
-def _hessian_with(local: Local, numbers: list[int], rows: Array, values: Array) -> Array:
-    """Return the Lagrangian's Hessian with given multipliers of unit gradients."""
+def _combined(hessians: Array, rows: Array, values: Array) -> Array:
+    """Return the sum of Hessians with given multipliers of unit gradients."""
     sizes = np.sqrt(np.einsum("ij,ij->i", rows, rows))
     factors = np.divide(values, sizes, out=np.zeros_like(values), where=sizes > 0)
-    return np.asarray(local.hessians[-1] - np.tensordot(factors, local.hessians[numbers], axes=1))
+    k, n, _ = hessians.shape
+    return np.asarray(np.dot(factors[None], hessians.reshape(k, n * n)).reshape(n, n))
 
 
 def _verdict(a: Analysis, rows: Rows) -> Verdict:
@@ -354,6 +362,7 @@ def _verdict(a: Analysis, rows: Rows) -> Verdict:
         return Verdict.NOT_STATIONARY  # the gap is not rounding: closing it would change the energy
     if not multipliers.exist:
         k = len(a.active)
+        # With independent gradients, or a way into the set, no multiplier means not stationary.
         regular = rows.independent
         if not regular and k:
             _, rate = inward_direction(rows.units[:k], rows.units[k:])

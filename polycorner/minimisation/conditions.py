@@ -93,6 +93,7 @@ def _central_multipliers(
     from scipy.optimize import nnls
 
     units = rows.units
+    # Equations have multipliers of either sign: two columns of opposite directions.
     split, distance = nnls(np.vstack([units, -units[k:]]).T, gradient)
     values = split[: len(units)].copy()
     values[k:] -= split[len(units) :]
@@ -109,6 +110,7 @@ def _central_multipliers(
 def _ranges(free: Array, k: int, values: Array) -> tuple[Array, Array, Array]:
     """Return the least, the largest and a central choice; ``free`` spans the relations."""
     count = len(values)
+    # In units of the largest multiplier, so that the bound of the programmes means `endless`.
     largest = max(1e-300, float(abs(values).max()))
     bound = 1e6
     start = values / largest
@@ -118,6 +120,7 @@ def _ranges(free: Array, k: int, values: Array) -> tuple[Array, Array, Array]:
         for side, target in ((1.0, lower), (-1.0, upper)):
             change = linear_programme(side * free[i], -free[:k], slack, bound=bound)
             target[i] = start[i] + free[i] @ change
+            # A vertex, where the programme was not stopped by its bound.
             if abs(change).max() < 0.5 * bound:
                 vertices.append(start + free @ change)
             elif abs(target[i]) >= 0.1 * bound:
@@ -173,7 +176,8 @@ def find_curvature(
     Where it is given what is left of the gradient, no curvature is trusted at which Newton's step,
     the one over the other, is longer than ``reach``: at a degenerate point nearby, both vanish.
     """
-    values, inner = np.linalg.eigh(basis.T @ hessian @ basis)
+    form = basis.T @ hessian @ basis
+    values, inner = np.linalg.eigh(form)
     vectors = basis @ inner
     if not len(weak):
         level = (values >= -small) & (values <= NEARLY_FLAT * small)
@@ -181,9 +185,9 @@ def find_curvature(
             level |= (values > 0) & (abs(left @ vectors) > reach * values)
         least = float(values[0]) if len(values) else np.inf
         return Curvature(values, vectors, least, vectors[:, level], decided=True)
+    # Positive on the whole face: no cone in it needs to be looked at.
     if len(values) and values[0] > NEARLY_FLAT * small:
         return Curvature(values, vectors, float(values[0]), vectors[:, :0], decided=True)
-    form = basis.T @ hessian @ basis
     rows = unit_rows(weak) @ basis
     least, zeros, decided = least_directions(form, rows, small, NEARLY_FLAT * small)
     return Curvature(values, vectors, least, basis @ zeros, decided=decided)

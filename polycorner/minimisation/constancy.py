@@ -82,7 +82,7 @@ def _sampled(problem: Problem, rows: tuple[int, ...]) -> tuple[Array, Array]:
         return points, problem.evaluate(points, 1)[1][:, chosen]
 
 
-def _combinations(slopes: Array, *, underflow: float = 1e-150) -> Array:
+def _combinations(slopes: Array) -> Array:
     """Return the combinations of columns ``(n, t)`` along which all slopes ``(k, m, n)`` vanish."""
     n, finite = slopes.shape[2], np.isfinite(slopes).all(axis=2)
     if (finite.sum(axis=0) < FEWEST).any():
@@ -91,7 +91,7 @@ def _combinations(slopes: Array, *, underflow: float = 1e-150) -> Array:
     largest = abs(found).max(axis=1)
     found = found[largest > 0] / largest[largest > 0, None]
     sizes = abs(found).max(axis=0, initial=0.0)
-    moving = sizes > underflow
+    moving = sizes > 1e-150  # the square of a smaller size would underflow
     basis = np.eye(n)[:, ~moving]
     if moving.any():
         scaled = found[:, moving] / sizes[moving]
@@ -105,6 +105,8 @@ def _combinations(slopes: Array, *, underflow: float = 1e-150) -> Array:
 
 def orthonormal(vectors: Array) -> Array:
     """Return an orthonormal basis of the span of columns, those of tiny remainder left out."""
+    if not vectors.shape[1]:
+        return vectors
     sizes = np.linalg.norm(vectors, axis=0)
     unit = vectors[:, sizes > 0] / sizes[sizes > 0]
     left, singular, _ = np.linalg.svd(unit, full_matrices=False)
@@ -152,6 +154,8 @@ def constancy(
     c = face.moving.shape[1]
     weights = np.eye(c)
     if c > 1:
+        # An energy such as x y is constant along both axes: mixtures that no symmetry prefers see
+        # it.
         mixed = np.sqrt([[2.0], [3.0], [5.0]]) ** np.arange(c)
         weights = np.vstack([weights, mixed / np.linalg.norm(mixed, axis=1)[:, None]])
     reach, change, followed = 0.0, 0.0, True
@@ -181,6 +185,7 @@ def _followed(
     guess = np.concatenate([start, face.multipliers])
     state = _corrected(problem, face, start, np.zeros(len(w)), guess)
     tangent = np.concatenate([face.moving @ w, np.zeros(len(face.multipliers))])
+    # Not even at the point itself: multipliers, or the point, are not known well enough.
     if state is None:
         return 0.0, 0.0
     level = float(problem.energy.value(state[: len(q)] * problem.scales))
@@ -198,6 +203,7 @@ def _followed(
             break
         pull = gradients[-1] - found[len(q) :] @ gradients[list(face.rows)]
         slope = abs(face.moving.T @ pull).max()
+        # Rounding of coordinates grows with the distance, and with it that of values and slopes.
         moved = max(abs(values[-1] - level) / (1 + t) ** 2, slope / (1 + t))
         if moved > CONSTANT * size:
             there = _in_small_steps(problem, face, start, w, state, reach, t)
@@ -205,6 +211,7 @@ def _followed(
             if there is None or not abs(there - found).max() <= same:
                 break  # the long step was a jump elsewhere
         change = max(change, float(moved) / size)
+        # A secant of the last step: the next guess is better than along the first tangent.
         tangent = (found - state) / step
         state, reach, t = found, t, 2 * t
     return reach, change
@@ -222,6 +229,7 @@ def _in_small_steps(
     """Return where small steps arrive; None where they jump, too."""
     before = here = state
     for t in np.linspace(begin, end, SMALLER + 1)[1:]:
+        # Linear continuation; the first step has no other before it, and is not judged.
         guess = 2 * here - before
         there = _corrected(problem, face, start, t * w, guess)
         if there is None or (

@@ -57,9 +57,13 @@ def _inner_minimisers(forms: Array) -> tuple[Array, Array]:
     across = np.linalg.svd(np.ones((1, m)))[2][1:].T  # orthonormal, of sum zero
     values, vectors = np.linalg.eigh(across.T @ forms @ across)
     regular = values[:, 0] > 10 * DEFAULT.rounding * abs(forms).max(axis=(1, 2))
+    # Half the gradient in the middle of the simplex: the minimiser is one step of Newton's from
+    # there.
     pull = (forms.sum(axis=2) / m) @ across
     weights = np.einsum("nij,ni->nj", vectors, pull) / np.where(regular[:, None], values, 1.0)
     x = 1.0 / m - np.einsum("nij,nj->ni", vectors, weights) @ across.T
+    # Without a minimum inside, the least value is on a face of the simplex, which is looked at,
+    # too.
     x = np.where(regular[:, None], x, -1.0)
     return x, np.einsum("ni,nij,nj->n", x, forms, x)
 
@@ -79,6 +83,7 @@ def cone_rays(rows: Array, tolerance: float) -> tuple[Array, Array, bool]:
     found = Rows(rows, tolerance)
     lines = found.null_space
     if found.independent:
+        # Columns of the pseudoinverse open one row each: no double description is needed.
         rays = np.linalg.pinv(found.units)
         return lines, rays / np.linalg.norm(rays, axis=0), True
     span = Rows(lines.T, tolerance).null_space if lines.size else np.eye(rows.shape[1])
@@ -117,8 +122,10 @@ def least_directions(
     vectors = lines @ vectors
     level = values <= nearly
     directions = [*vectors[:, level].T, *-vectors[:, level].T]
+    # Otherwise a line along which the form falls decides already.
     if not level.any() or values[0] >= -small:
         stiff = vectors[:, ~level]
+        # Each ray with the best that lines with curvature can add to it: the Schur complement.
         rays = rays - stiff @ ((stiff.T @ form @ rays) / values[~level][:, None])
         rays = rays / np.linalg.norm(rays, axis=0)
         directions += _pulled(form, rays, vectors[:, level])
@@ -142,5 +149,6 @@ def _pulled(form: Array, rays: Array, level: Array) -> list[Array]:
         for line in level.T:
             plane = np.array([ray, line])
             vector = np.linalg.eigh(plane @ form @ plane.T)[1][:, 0]
+            # Along the line both ways, along the ray forward only.
             found.append((vector if vector[0] >= 0 else -vector) @ plane)
     return found

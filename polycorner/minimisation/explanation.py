@@ -105,11 +105,8 @@ def _position(a: Analysis, stratum: Stratum, unit: str | None) -> str:
     return f"It lies in the polyhedron, on a face of dimension {dimension}; {active}."
 
 
-def _missed(a: Analysis, unit: str | None, *, flat: float = 1e-3) -> str:
-    """Name the most violated constraint and the size of its violation.
-
-    Its value counts as stationary up to a slope of ``flat`` times that of the parabola.
-    """
+def _missed(a: Analysis, unit: str | None) -> str:
+    """Name the most violated constraint and the size of its violation."""
     d, local = a.local.problem.polyhedron, a.local
     away = local.away
     m = a.local.problem.inequalities
@@ -124,7 +121,8 @@ def _missed(a: Analysis, unit: str | None, *, flat: float = 1e-3) -> str:
         worst = int(np.flatnonzero(away[:m] == short)[0])
         violated = f"the inequality {d.names[worst]}"
     slope, bend = abs(local.gradients[worst]).max(), abs(local.hessians[worst]).max()
-    vanishing = slope <= flat * np.sqrt(abs(local.values[worst]) * bend)
+    # The slope of a parabola with this value and bend is the root, but for a factor.
+    vanishing = slope <= 1e-3 * np.sqrt(abs(local.values[worst]) * bend)
     size = (
         "and its gradient vanishes there: no small step changes it to first order"
         if vanishing
@@ -355,12 +353,12 @@ def _with(value: float, unit: str | None) -> str:
     return f"{number(value, DIGITS)} {unit or ''}".rstrip()
 
 
-def _direction(a: Analysis, direction: Array, *, least: float = 1e-6) -> str:
+def _direction(a: Analysis, direction: Array) -> str:
     """Return the components of a unit direction that can be seen, in the coordinates themselves."""
     manifold = a.local.problem.polyhedron.manifold
     words = []
     rows = zip(manifold.names, manifold.periods, manifold.scales, direction, strict=True)
     for name, period, scale, x in rows:
-        if abs(x) > least:
+        if abs(x) > 1e-6:
             words.append(f"d{name} = {number(scale * x, DIGITS)} {angle_unit(period)}".rstrip())
     return f"({', '.join(words)})"

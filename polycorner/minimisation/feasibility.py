@@ -72,6 +72,7 @@ class _Violation:
         self.signed = np.array([i < problem.inequalities for i in rows])
         values, gradients = problem.evaluate(start, 1)
         sizes = np.linalg.norm(gradients[rows], axis=1)
+        # Fixed at the start, so that the violation stays differentiable.
         self.weights = np.where(np.isfinite(sizes) & (sizes > 0), 1 / np.where(sizes, sizes, 1), 1)
         self.domain = bool(np.isfinite(values[-1]))  # the energy's, to be kept
 
@@ -79,6 +80,7 @@ class _Violation:
         (values,) = self.problem.evaluate(u * self.problem.scales, 0)
         v: Array = values[self.rows] * self.weights
         if self.domain and not np.isfinite(values[-1]):
+            # The search turns back where the energy is not defined, if it was at the start.
             v = v + np.nan
         return np.where(self.signed, np.minimum(v, 0), v)
 
@@ -98,6 +100,8 @@ class _Violation:
         rng = np.random.default_rng(0)
         u, size = self.least(u)
         yield u
+        # From shorter to longer: a saddle is left by the first, another part of space needs the
+        # last.
         for move in MOVES:
             other, less = self.least(u + move * rng.standard_normal(u.size))
             if less < size:
@@ -138,6 +142,8 @@ class _Violation:
                 break
             after = u - np.linalg.lstsq(curved, slope, rcond=1e-12)[0]
             left = self.slope(after)
+            # Newton's method seeks any stationary point, saddles included: it must not lead far
+            # away.
             if not np.linalg.norm(left) < np.linalg.norm(slope):
                 break
             u, slope = after, left

@@ -116,12 +116,14 @@ def reduce_energy(
     system = _System.of(problem, q, hessian, face)
     if system is None:
         return None
+    # A curve right to half of the degree suffices: its error enters the energy by its square.
     half = ring(face.variables, order // 2)
     curve, multipliers = system.solve(half)
     full = ring(face.variables, order)
     unknowns = _padded(curve, full), _padded(multipliers, full)
     value = system.lagrangian(full, *unknowns)
     value[0, 0] = 0.0
+    # The point is rounded: coefficients are those of a point beside it.
     blur = np.full(face.variables, POINT * (1.0 + float(abs(q / problem.scales).max())))
     size = abs(value[0])
     missed = system.errors(half, curve, multipliers)
@@ -168,6 +170,7 @@ class _System(Value):
         gradients = problem.evaluate(q, 1)[1][list(face.rows)]
         matrix = bordered_system(hessian, gradients, held, across)
         size = abs(matrix).max(axis=1, initial=0.0)
+        # Rows have units of their own, and are compared once they are of one size.
         if not (size > 0).all() or np.linalg.cond(matrix / size[:, None]) > CLEAR**2:
             return None
         inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
@@ -182,6 +185,7 @@ class _System(Value):
         unknowns = np.zeros((n + len(self.face.rows), 2, 1))
         unknowns[:n, 0, 0] = self.q / self.problem.scales
         unknowns[n:, 0, 0] = self.face.multipliers
+        # Twice more at the end: what rounding left of lower degrees is corrected.
         for degree in [*range(1, domain.order + 1), domain.order, domain.order]:
             known = ring(domain.variables, degree)
             unknowns = _padded(unknowns, known)
@@ -247,6 +251,7 @@ class _System(Value):
         total = energy[0].copy()
         for lam, f, s in zip(multipliers, functions, self._targets(domain), strict=True):
             gap = f[0] - s
+            # The target is exact: the error is that of the function alone.
             gap[1] = f[0][1]
             product = domain.mul(lam, gap)
             total[0] -= product[0]

@@ -69,6 +69,7 @@ class Paths(Quotient):
         if parts > LONGEST:
             return False
         away, energies = self._along(
+            # Both ends are known to lie in the set.
             manifold.moved(p, np.linspace(0, 1, parts + 1)[1:-1, None] * way)
         )
         if not (abs(energies - energy) <= slack).all():
@@ -93,6 +94,7 @@ class Paths(Quotient):
         manifold = self.manifold
         away, _ = self._along(manifold.moved(p, along * step * self.scales))
         closed = abs(away[0]) <= self.tolerances.same
+        # A chord of a curved wall cuts into it by about half the square of its length.
         bent = np.where(closed, (along * abs(step).max()) ** 2, 0.0)
         inside = (away + bent)[:, : self.problem.inequalities]
         enters = self.polyhedron.implicit_of(inside) >= -self.tolerances.zero
@@ -112,12 +114,10 @@ class Paths(Quotient):
             p = reached
         return False
 
-    def _towards(
-        self, p: Array, miss: Array, slack: float, *, least: float = 1e-3
-    ) -> tuple[Array, Piece] | None:
+    def _towards(self, p: Array, miss: Array, slack: float) -> tuple[Array, Piece] | None:
         """Return the step along flat directions that best reduces ``miss``, and what is active.
 
-        One that does not reduce it by the fraction ``least`` leads nowhere.
+        One that does not reduce it by a thousandth leads nowhere.
         Near a crossing of loci all curvatures are small: up to ``slack`` they are flat.
         """
         analysis = analyse(self.problem, p, self.tolerances, higher="none")
@@ -127,9 +127,10 @@ class Paths(Quotient):
         if not flat.shape[1] or curvature.least < -level:
             return None
         moves = 1e-5 * flat.T * self.scales
+        # Differences: invariants of a user's symmetry have no derivatives that are known.
         slopes = [(self.place(p + v) - self.place(p - v)) / 2e-5 for v in moves]
         weights = np.linalg.lstsq(np.array(slopes).T, miss, rcond=1e-6)[0]
-        if np.linalg.norm(miss - weights @ slopes) > (1 - least) * np.linalg.norm(miss):
+        if np.linalg.norm(miss - weights @ slopes) > (1 - 1e-3) * np.linalg.norm(miss):
             return None
         step = flat @ weights
         step = step * min(1.0, STRIDE / max(abs(step).max(), 1e-300))
@@ -148,6 +149,7 @@ class Paths(Quotient):
             guess = manifold.moved(p, part * step * self.scales)
             point = self._settled(guess, active, 0.5 * length, (energy, slack))
             left = np.inf if point is None else float(np.linalg.norm(goal - self.place(point)))
+            # A step that brings the goal hardly nearer goes around it.
             if before - left >= GAIN * min(length, before):
                 return point
         return None
@@ -168,6 +170,7 @@ class Paths(Quotient):
                 rank_tolerance=both.rank,
             )
             point, settled = found.point, found.search is None
+        # Another minimum may be as near as the locus.
         same = abs(self.problem.energy.value(point) - level[0]) <= level[1]
         return point if settled and same and self._apart(point, q) <= near else None
 
@@ -225,6 +228,7 @@ class Loci:
         """Record the end of a descent."""
         energy, place = found.energy, self.quotient.place(found.point)
         level = [locus for locus in self.loci if abs(locus.energy - energy) <= locus.slack]
+        # The nearest first: nearly always it is the one, and other comparisons are dear.
         near = sorted(((*locus.nearest(place), locus) for locus in level), key=lambda near: near[0])
         same = self._known(near, found.point)
         if same is None:
@@ -241,6 +245,7 @@ class Loci:
         for k, first in enumerate(wide):
             for other in wide[k + 1 :]:
                 level = abs(first.energy - other.energy) <= first.slack
+                # It may have been merged with another one on the way.
                 if level and other in self.loci and self._joined(first, other):
                     self._merge(first, other)
 
@@ -261,6 +266,7 @@ class Loci:
 
     def _connected(self, near: list[Near], point: Array) -> Locus | None:
         """Return the nearest locus with a path to a point, a straight one if possible."""
+        # Straight ways to all loci before a walk to any: a walk costs much more.
         for _, k, locus in near:
             if self.quotient.is_straight(locus.images[k], point, locus.energy, locus.slack):
                 return locus
@@ -309,6 +315,7 @@ def check_symmetry(quotient: Paths, points: Array) -> None:
     """
     problem, symmetry = quotient.problem, quotient.symmetry
     changing = 10 * quotient.tolerances.level
+    # In no special direction, and the same every time.
     beside = BESIDE * np.cos(np.arange(1, problem.dimension + 1)) * problem.scales
     for q in [*points, *(points + beside)]:
         values, gradients, hessians = problem.evaluate(q, 2)

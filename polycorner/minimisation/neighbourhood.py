@@ -28,14 +28,13 @@ from polycorner.minimisation.findings import Analysis, Local, steepest_descent
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import Rows
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import Tolerances
+from polycorner.tolerances import SEARCH, Tolerances
 
 NEARER = 16  # ratio of the distances of far and near points
 STEADY = 0.5  # a change that shrinks by less than this between far and near points is a jump
 WAYS = 8  # pairs of opposite points
 FAINT = 1e-3  # curvature, relative to the largest, up to which one is looked at
 FARTHEST = 0.01  # scale units up to which Newton's step says how far a degenerate point may be
-STEPS = (0.1, 0.01, 0.001)  # relative to radii of curvature, at which a way down is sought
 
 
 # --------------------------------------------------------------- kinks
@@ -60,6 +59,8 @@ def obstacle(
     known = np.isfinite(gradients).all() and np.isfinite(hessians).all()
     if known and not kinked:
         return ""
+    # Beyond the rounding of difference quotients, near enough that a smooth derivative changes
+    # little.
     beside = q + _beside(problem, 10 * tolerances.difference)
     for order, derivative in (("first", gradients), ("second", hessians)):
         infinite = ~np.isfinite(derivative.reshape(len(derivative), -1)).all(axis=1)
@@ -72,6 +73,7 @@ def obstacle(
 
 def _beside(problem: Problem, reach: float) -> Array:
     """Return steps to points as far as ``reach``, in scale units, and near, on opposite sides."""
+    # Directions without symmetry, so that none of them runs along a kink of a simple formula.
     ways = np.cos(np.outer(np.arange(1, WAYS + 1), np.sqrt(np.arange(1, problem.dimension + 1))))
     ways *= reach * problem.scales / np.linalg.norm(ways, axis=1, keepdims=True)
     return np.concatenate([ways, -ways, ways / NEARER, -ways / NEARER])
@@ -85,6 +87,7 @@ def _jump(
     for order, derivative, there in zip(("first", "second"), here, beside, strict=True):
         changes = abs(there - derivative).reshape(2, 2 * WAYS, *there.shape[1:])
         for row in rows:
+            # The largest of all: a jump shows on one side of the kink only.
             far, near = changes[:, :, row].reshape(2, -1).max(axis=1)
             if not near <= max(STEADY * far, rounding * abs(there[:, row]).max()):
                 f = problem.functions[row]
@@ -106,6 +109,7 @@ def steady(a: Analysis) -> Analysis:
     if not len(values) or values[-1] <= 0:
         return a
     tried = (values > nearly) & (values <= FAINT * values[-1])
+    # The stiffest direction: where even that is not steady, no curvature is to be trusted.
     tried[-1] = True
     level = _changes(a, tried)
     if not level.any():
@@ -133,18 +137,20 @@ def _changes(a: Analysis, tried: NDArray[np.bool_]) -> NDArray[np.bool_]:
     local, gradients = a.local, a.gradients
     numbers = [*a.active, *local.sections]
     with np.errstate(all="ignore"):
+        # Of a vanishing gradient the multiplier is 0, and 0 / 0 would spoil all shares.
         sizes = np.maximum(np.sqrt((gradients * gradients).sum(axis=1)), 1e-300)
         shares = a.multipliers.values / sizes
         left = local.slope - shares @ gradients
         newton = abs(ways @ left) / abs(values)
         newton[np.isnan(newton)] = 0.0
         reach = local.tolerances.difference * (1 + abs(local.point / local.problem.scales).max())
-        ahead = ways * np.clip(2 * newton, reach, max(reach, FARTHEST))[:, None]
-        points = local.point + np.vstack([ahead, -ahead]) * local.problem.scales
-        hessians = local.problem.evaluate(points, 2)[2]
-        both = np.vstack([ways, ways])[:, :, None]
-        bends = (both.transpose(0, 2, 1)[:, None] @ hessians @ both[:, None])[:, :, 0, 0]
-        moved = bends[:, -1] - bends[:, numbers] @ shares
+        lengths = np.minimum(np.maximum(2 * newton, reach), max(reach, FARTHEST))
+        ahead = ways * lengths[:, None]
+        points = local.point + np.concatenate([ahead, -ahead]) * local.problem.scales
+        hessians = local.problem.evaluate(points, 2)[2][:, [*numbers, -1]]
+        both = np.concatenate([ways, ways])
+        bends = (both[:, None, None] @ hessians @ both[:, None, :, None])[:, :, 0, 0]
+        moved = bends[:, -1] - bends[:, :-1] @ shares
         changed = abs(moved.reshape(2, -1) - values) > 0.5 * abs(values)
     level = np.zeros(len(tried), dtype=np.bool_)
     level[tried] = changed.any(axis=0)
@@ -163,13 +169,12 @@ def unresolved(local: Local, numbers: list[int], rows: Rows) -> float:
         return 0.0
     sizes = np.linalg.norm(local.gradients[numbers], axis=1)
     miss = float(np.linalg.norm(local.values[numbers] / sizes))
-    level = 2.0 * np.sqrt(bend(local, numbers) * miss)
+    level = 2.0 * np.sqrt(bend(local, numbers, sizes) * miss)
     return level if rows.singular[rows.rank - 1] <= level else 0.0
 
 
-def bend(local: Local, numbers: list[int]) -> float:
-    """Return a bound of the derivative of unit gradients."""
-    sizes = np.linalg.norm(local.gradients[numbers], axis=1)
+def bend(local: Local, numbers: list[int], sizes: Array) -> float:
+    """Return a bound of the derivative of unit gradients, of which are given the sizes."""
     return float(np.linalg.norm(local.hessians[numbers] / sizes[:, None, None]))
 
 
@@ -184,20 +189,22 @@ def falls_on_set(a: Analysis) -> bool:
     if rate <= local.small:
         return False
     numbers = [n for i, n in enumerate([*a.active, *local.sections]) if i not in a.blind]
-    unit = 1.0 / max(1.0, bend(local, numbers))
+    sizes = np.linalg.norm(local.gradients[numbers], axis=1)
+    unit = 1.0 / max(1.0, bend(local, numbers, sizes))
     smaller = problem.with_independent_equations(
         frozenset(a.active), [local.point], local.tolerances
     )
     everything, miss = frozenset(range(smaller.inequalities)), local.tolerances.zero / 10
-    for step in unit * np.array(STEPS):
+    for step in unit * np.array(SEARCH.pushes):
         ahead = local.point + step * way * problem.scales
         reached, point = smaller.restore(everything, ahead)
         moved = float(np.linalg.norm((point - ahead) / problem.scales))
         fall = float(local.values[-1] - problem.energy.value(point))
         values, gradients = problem.evaluate(point, 1)
         held = problem.holds(frozenset(), values, gradients, miss)
+        # A correction as long as the step may have undone it.
         if not (reached and moved <= step / 4 and held):
             return False
-        if step < STEPS[0] * unit and not fall >= rate * step / 2:
+        if step < SEARCH.pushes[0] * unit and not fall >= rate * step / 2:
             return False
     return True

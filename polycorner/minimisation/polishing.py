@@ -49,13 +49,17 @@ def polished(
     values, gradients = problem.evaluate(q, 1)
     lower = values[-1] < problem.energy.value(start)
     far = abs(q / problem.scales).max() > tolerances.unbounded
+    # So far out distances are rounded: a point that the method takes for feasible is one.
     if far and lower and _violated(problem, piece, q, 1e-6) == frozenset():
         return Endpoint(start, iterations, Verdict.UNBOUNDED)
     if np.isfinite(values).all() and np.isfinite(gradients).all():
+        # A method ends some way off its face: functions count as near that are much less than
+        # active.
         face = _carrying(problem, piece, values, gradients, tolerances.beside)
         point = _on_face(problem, piece, q, face, tolerances)
         if point is not None:
             return Endpoint(point, iterations, None if stopped else Verdict.NOT_CONVERGED)
+    # Where the end cannot be moved into the set, the start may: there is always some point to show.
     for origin in (q, start):
         reached, point = problem.restore(piece, origin)
         if reached and np.isfinite(problem.energy.value(point)):
@@ -72,6 +76,7 @@ def slsqp(problem: Problem, piece: Piece, q: Array, limit: int, tolerances: Tole
     size = float(max(abs(gradients[-1]).max(), abs(hessians[-1]).max())) or 1.0
     rows = sorted(piece)
     sections = list(range(m, problem.rows - 1))
+    # SLSQP's tolerance is absolute: differences of a large energy would be lost in it.
     floor = float(values[-1])
     options: Any = {"ftol": 1e-15, "maxiter": limit}
 
@@ -108,9 +113,12 @@ def _on_face(
     Violated functions join the face; functions with negative multipliers leave it.
     """
     seen: set[Piece] = set()
+    # Functions that join and leave in turn would go round for ever.
     while face not in seen:
         seen.add(face)
         point, last = problem.on_face(face, q)
+        # Newton's method may settle at another stationary point, which was not the one that was
+        # found.
         if not last < tolerances.settled or abs((point - q) / problem.scales).max() > 0.1:
             return None
         violated = _violated(problem, piece, point, tolerances.feasible)
@@ -119,6 +127,7 @@ def _on_face(
         negative = _negative(problem, face, point, tolerances)
         if not violated and not negative:
             return point
+        # Violations first: multipliers say nothing at a point that is not in the set.
         face = (face | violated) if violated else face - negative
     return None
 
@@ -129,6 +138,7 @@ def _negative(problem: Problem, face: Piece, point: Array, tolerances: Tolerance
     chosen = sorted(face)
     held = [*chosen, *range(problem.inequalities, problem.rows - 1)]
     rows = Rows(gradients[held], tolerances.rank / 100)
+    # Multipliers are not unique: a negative one is no reason to open a contact.
     if not chosen or not rows.independent:
         return frozenset()
     weights = rows.weights(gradients[-1])[: len(chosen)]

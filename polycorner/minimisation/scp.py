@@ -94,6 +94,7 @@ def sequential_convex(
     """
     kept = [*sorted(piece), *range(problem.inequalities, problem.rows - 1)]
     count, scales = len(piece), problem.scales
+    # cvxpy numbers its variables with a global counter, and is not safe in threads.
     with ONE_AT_A_TIME:
         model = ConvexStep.stated(problem.dimension, count, len(kept) - count)
     values, gradients, hessians = problem.evaluate(q, 2)
@@ -105,6 +106,7 @@ def sequential_convex(
         lengths[lengths == 0] = 1.0
         rows = gradients[kept] / lengths[:, None]
         weights = _weights(rows, gradients[-1] / size, duals)
+        # An exact penalty has to be larger than every multiplier, or the merit falls off the set.
         penalty = max(penalty, 3 * float(abs(weights).max(initial=0.0)))
         merit = _merit(values, gradients, kept, count, size, penalty)
         _load(model, values, gradients, kept, lengths, size, count, radius)
@@ -125,6 +127,7 @@ def sequential_convex(
         if np.isfinite(new_merit) and gained >= -1e-14 * (1 + abs(merit)):
             q, (values, gradients, hessians) = trial, after
             radius = min(2 * radius, 1.0) if reach > 0.9 * radius else radius
+            # Polishing does the rest: Newton's method converges from here in a few steps.
             if reach < 1e-7 or idle > 1:
                 return q, iteration, True
         else:
@@ -190,5 +193,6 @@ def _merit(
 def _square_root(matrix: Array) -> Array:
     """Return ``R`` with ``R^T R`` the nearest safely positive form."""
     values, vectors = np.linalg.eigh(matrix)
+    # A model without curvature in some direction has no minimiser but on the trust region.
     floor = 1e-6 * max(1.0, abs(values).max())
     return np.asarray(np.sqrt(np.maximum(values, floor))[:, None] * vectors.T)

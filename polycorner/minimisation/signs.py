@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 from polycorner.minimisation.series import Ring, ring
 from polycorner.polyhedra.cones import null_space
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
 
 MAX_BOXES = 20_000  # of one pass
 DEPTH = 30  # halvings of a box
 APART = 0.05  # distance of zeros that are told apart
-ZERO = 1e-9  # of the sum of coefficients: a value that is neither positive nor negative
 SIMPLE = 0.05  # of the largest coefficient across a ray: one that gives the order of a zero
 EDGES = 24  # of Newton's diagram tried, at most
 
@@ -43,7 +43,7 @@ def least_on_box(
     that are left.
     """
     m = exponents.shape[1]
-    limit = ZERO * abs(values).sum()
+    limit = DEFAULT.level * abs(values).sum()
     middles, widths = _sides(m, half)
     best, where = np.inf, np.ones(m)
     for _ in range(DEPTH * max(1, m - 1)):
@@ -243,12 +243,12 @@ def _along_ray(domain: Ring, coefficients: Array, degree: int, ray: Array) -> Si
         if c and power[0] >= 0 and sum(power) <= blown.order:
             g[blown.index[power]] = c
     size = abs(turned[domain.degrees == degree]).max()
-    g[abs(g) <= ZERO * size * (blown.exponents[:, 0] == 0) * (blown.degrees <= 1)] = 0.0
+    g[abs(g) <= DEFAULT.level * size * (blown.exponents[:, 0] == 0) * (blown.degrees <= 1)] = 0.0
     series = _least_across(blown, g, rest, size)
     if series is None:
         return None
     for k in range(1, rest + 1):
-        if abs(series[k]) > ZERO * size:
+        if abs(series[k]) > DEFAULT.level * size:
             sign = Sign.NEGATIVE if k % 2 or series[k] < 0 else Sign.POSITIVE
             return signed(sign, degree + k, -ray if series[k] > 0 and k % 2 else ray)
     return signed(Sign.ZERO, degree, ray)

@@ -34,7 +34,7 @@ class Rows:
         self.units = unit_rows(matrix)
         self._left, self.singular, self._right = np.linalg.svd(self.units)
         top = float(self.singular[0]) if self.singular.size else 0.0
-        self.rank = int((self.singular > tolerance * top).sum()) if top > 0 else 0
+        self.rank = int(np.count_nonzero(self.singular > tolerance * top)) if top > 0 else 0
 
     @property
     def independent(self) -> bool:

@@ -12,7 +12,7 @@ from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, Tolerances
 
 RANKED = 4  # points that are looked at
-AROUND = (1e-3, 0.1, 1.0)  # distances, in scale units, of points beside them
+AROUND = (0.1, 1.0)  # distances, in scale units, of points beside them, and one much smaller
 STEPS = 50  # to the equations
 
 
@@ -40,7 +40,7 @@ def independent_equations(
     found = (
         _on_equations(polyhedron, q + radius * scales * rng.standard_normal(len(q)), tolerances)
         for q in islice(points, RANKED if count > 1 else 0)
-        for radius in AROUND
+        for radius in (tolerances.beside, *AROUND)
     )
     samples = [gradients for gradients in found if gradients is not None]
     if not samples:

@@ -1,7 +1,6 @@
 from .elements import Skeleton
 from .parts import Completeness, Contact, Corner, Edge, Face
-from .refinement import traced
-from .search import examine_faces, resume, skeleton
+from .search import examine_faces, resume, skeleton, traced
 from .states import Budget
 from .walks import End
 

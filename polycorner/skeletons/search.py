@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.checks import reals
 from polycorner.kinds import checked
+from polycorner.polyhedra.faces import projected
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.quotients import Quotient, WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
@@ -19,8 +20,9 @@ from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.incidences import Flag
 from polycorner.skeletons.insides import add_inner_corners
-from polycorner.skeletons.parts import Completeness
+from polycorner.skeletons.parts import Completeness, Edge
 from polycorner.skeletons.states import Budget, SearchState
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.workers import opened_if_any
 
@@ -245,3 +247,42 @@ def _run(
         return assembled(explorer, complete)
     except KeyboardInterrupt:
         return assembled(explorer, Completeness.INTERRUPTED)
+
+
+@checked
+def traced(skeleton: Skeleton, edge: Edge, *, pieces: int = 8) -> Array:
+    """Return points of an edge ``(k, n)``: its polyline with every chord cut into pieces.
+
+    Newton's method projects the new points to the edge, so that they lie on it as exactly as
+    those of the polyline; coordinates are not wrapped.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        What :func:`~polycorner.skeletons.search.skeleton` returned.
+    edge : Edge
+        One of its edges.
+    pieces : int, optional
+        Number of pieces of a chord.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the argument, what was expected and what came.
+    """
+    state = checks.instance("skeleton", skeleton, Skeleton).state
+    checks.instance("skeleton", state, SearchState, "polycorner.skeleton")
+    checks.instance("edge", edge, Edge)
+    checks.whole("pieces", pieces, least=1)
+    quotient, scales = state.quotient, skeleton.polyhedron.manifold.scale_array
+    rows = [skeleton.polyhedron.names.index(name) for name in edge.active]
+    kept = quotient.at(edge.polyline[len(edge.polyline) // 2]).basis(rows)
+    points = [edge.polyline[0]]
+    for start, end in zip(edge.polyline, edge.polyline[1:], strict=False):
+        chord = float(np.linalg.norm((end - start) / scales))
+        for s in np.arange(1, pieces) / pieces:
+            point = projected(quotient, start + s * (end - start), kept, chord)
+            if point is not None:
+                points.append(point.q)
+        points.append(end)
+    return np.array(points)

@@ -17,8 +17,6 @@ from polycorner.spaces.embedding import (
     upright,
 )
 
-# By how much the length of a vector that stands for a point may differ from one.
-NEAR = 1e-3
 QUATERNION = 4
 
 
@@ -85,8 +83,8 @@ class Factors(tuple[Factor, ...]):
             q[..., f.at] = normalised(q[..., f.at])
         return q
 
-    def check(self, q: Array, argument: str, near: float | None) -> None:
-        """Raise ValueError for a vector of length zero, or one not ``near`` the length one."""
+    def check(self, q: Array, argument: str, near: float | None = 1e-3) -> None:
+        """Raise ValueError for a vector not ``near`` the length one, or if None, of length zero."""
         for f in self:
             length = np.sqrt(np.einsum("...i,...i->...", q[..., f.at], q[..., f.at]))
             bad = ~(length > 0) if near is None else abs(length - 1) > near

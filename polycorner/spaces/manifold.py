@@ -25,7 +25,7 @@ from polycorner.spaces.arguments import (
     units_of,
 )
 from polycorner.spaces.embedding import rotation_matrix
-from polycorner.spaces.factors import NEAR, Factors, factors
+from polycorner.spaces.factors import Factors, factors
 from polycorner.values import Value, cached_property, read_only
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Geometry(Value):
         ValueError
             For lengths that differ from one by more than 1e-3.
         """
-        self.factors.check(points, argument, NEAR)
+        self.factors.check(points, argument)
         return self.onto(points)
 
     def onto(self, q: Array) -> Array:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, Symmetry
 from polycorner.polyhedra.quotients import Quotient
-from polycorner.skeletons import End, links
+from polycorner.skeletons import End, explorer
 from polycorner.skeletons.dependence import follow_edge
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.parts import arc_length
@@ -71,7 +71,7 @@ def test_functions_with_positive_weights_open(p, q, first, second):
 def test_the_search_of_the_link_finds_the_same(q, monkeypatch):
     D = fold(1.3, q, bent=0.4 * (q == 0))
     found = figure(D)
-    monkeypatch.setattr(links, "fold_figure", lambda *_: None)
+    monkeypatch.setattr(explorer, "fold_figure", lambda *_: None)
     assert opened(figure(D)) == opened(found)
 
 
@@ -182,7 +182,7 @@ def test_two_flaps_leave_faces_around_the_corner(monkeypatch):
     D = Polyhedron(SPACE, [a, t**2 + 2 * b**2 + t * b - a])
     found = figure(D)
     assert (found.rank, found.full, found.rays) == (1, 3, ())
-    monkeypatch.setattr(links, "fold_figure", lambda *_: None)
+    monkeypatch.setattr(explorer, "fold_figure", lambda *_: None)
     around = Counter(sector.active for sector in figure(D).sectors)
     assert Counter(sector.active for sector in found.sectors) == around
     for sector in found.sectors:

@@ -21,9 +21,9 @@ from filelock import FileLock
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.sweeps import SweepError, metadata, open_results, sweep
-from polycorner.sweeps.metadata import write_root
-from polycorner.sweeps.store import Store, _chunk_shape
+from polycorner.sweeps import SweepError, open_results, sweep
+from polycorner.sweeps import store as stores
+from polycorner.sweeps.store import Store, _chunk_shape, write_root
 from polycorner.sweeps.tables import Variable
 
 GRID = {"a": ([0, 1, 2], "mm"), "b": [1, 2, 3, 4]}
@@ -226,17 +226,17 @@ def test_what_is_read_while_more_is_written_is_what_was_there(tmp_path):
 def test_a_store_that_changes_as_it_is_checked_is_checked_anew(tmp_path, monkeypatch):
     """The root says how many chunks a finished study has; a retry writes others."""
     drawn(tmp_path / "s")
-    real, calls = metadata.chunks, []
+    real, calls = stores.chunks, []
 
     def changing(array):
         if not calls:
-            about, names = metadata.checked_root(tmp_path / "s")
+            about, names = stores.checked_root(tmp_path / "s")
             about = {k: v for k, v in about.items() if k not in ("checksums", "sha256")}
             write_root(tmp_path / "s", about | {"complete": "unfinished"}, names)
         calls.append(array)
         return [] if len(calls) == 1 else real(array)
 
-    monkeypatch.setattr(metadata, "chunks", changing)
+    monkeypatch.setattr(stores, "chunks", changing)
     assert open_results(tmp_path / "s").attrs["complete"] == "unfinished"
 
 

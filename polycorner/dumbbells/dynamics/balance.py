@@ -57,17 +57,6 @@ def return_ratio(drum: DumbbellDrum) -> float:
     return math.hypot(stretched, 2 * along * across) / drum.length**2
 
 
-def impact_mass(drum: DumbbellDrum) -> float:
-    """Return the mass ``M`` in g by which a plastic impact at both rods dissipates ``M v^2 / 2``.
-
-    Two dumbbells of mass ``2 m`` that approach each other with ``v`` across their axes push at half
-    of ``s`` from their centres: ``1/M = 1/m + s^2 / (2 I)``.  Friction has no part in an impact.
-    """
-    m, (_, along) = drum.ball_mass, offsets(drum)
-    inertia = 2 * m * (drum.length**2 / 4 + 0.4 * drum.ball_radius**2)
-    return 1 / (1 / m + along**2 / (2 * inertia))
-
-
 @dataclass(frozen=True)
 class ImpactTurn:
     """What one impact does to a pair in a plane.

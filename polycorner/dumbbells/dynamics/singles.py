@@ -7,7 +7,6 @@ simulation, far apart from each other.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -196,54 +195,6 @@ def _merged(slips: list[tuple[float, float]], gap: float) -> list[tuple[float, f
         return []
     breaks = [k + 1 for k, (a, b) in enumerate(pairwise(slips)) if b[0] - a[1] >= gap]
     return [(slips[i][0], slips[j - 1][1]) for i, j in pairwise([0, *breaks, len(slips)])]
-
-
-@dataclass(frozen=True)
-class Decay:
-    """Turning of single dumbbells by noise.
-
-    Attributes
-    ----------
-    chatter : float
-        Amplitude of the noise of the loads.
-    heading : float
-        Heading at the start, in rad.
-    rate : Mean
-        Change of the heading per time over that at the start, in 1/s, over the ensemble; negative
-        where it decays.
-    climb_rate : Mean
-        Mean rise per time, in mm/s.
-    """
-
-    chatter: float
-    heading: float
-    rate: Mean
-    climb_rate: Mean
-
-
-def heading_decay(
-    drum: DumbbellDrum,
-    heading: float,
-    chatters: Iterable[float],
-    *,
-    duration: float = 120.0,
-    count: int = 16,
-    seed: int = 0,
-    correlation_time: float = 0.01,
-    dt: float = 1e-3,
-) -> tuple[Decay, ...]:
-    """Return the decay of headings and the climb rates for each amplitude of the noise.
-
-    ``count`` dumbbells with the same start and independent noise.
-    """
-    found = []
-    for chatter in chatters:
-        noise = Noise(chatter=chatter, correlation_time=correlation_time, seed=seed)
-        path = follow(drum, np.full(count, heading), duration, noise=noise, dt=dt)
-        change = (path.q[-1, :, 2] - heading) / (heading * path.times[-1])
-        rise = (path.q[-1, :, 1] - path.q[0, :, 1]) / path.times[-1]
-        found.append(Decay(chatter, heading, Mean.of(change), Mean.of(rise)))
-    return tuple(found)
 
 
 def keel_ratio(drum: DumbbellDrum, heading: float, *, duration: float = 60.0) -> float:

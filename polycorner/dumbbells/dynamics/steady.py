@@ -1,17 +1,14 @@
 """Means of driven pairs: over time, and over the pairs that stayed together."""
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.dumbbells.drum import DumbbellDrum
-from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, minimiser_heading
+from polycorner.dumbbells.dynamics.dyads import DyadPaths, minimiser_heading
 from polycorner.dumbbells.dynamics.singles import Mean
-from polycorner.dumbbells.pair import Chirality
-from polycorner.motion import Noise
 from polycorner.toolkit import Array
 
 WINDOW = 5  # correlation times over which correlations are summed
@@ -118,24 +115,3 @@ def correlation_time(values: ArrayLike) -> float:
     sums = np.cumsum(correlations / correlations[0]) - 0.5
     enough = np.arange(len(x)) >= WINDOW * sums
     return max(0.5, float(sums[np.argmax(enough)])) if enough.any() else 0.5 * len(x)
-
-
-def steady_headings(
-    drum: DumbbellDrum,
-    lengths: Iterable[float],
-    noise: Noise,
-    *,
-    headings: Sequence[float] = (2.0, 6.0, 10.0, 14.0),
-    duration: float = 300.0,
-    after: float = 150.0,
-    hand: Chirality = "R",
-) -> tuple[Steady, ...]:
-    """Return the behaviour under noise of pairs of each length, from headings in degrees.
-
-    For left-handed pairs the headings are taken negative.
-    """
-    sign = 1.0 if hand == "R" else -1.0
-    starts = [(hand, sign * math.radians(angle)) for angle in headings]
-    drums = [replace(drum, length=float(length)) for length in lengths]
-    runs = (follow_dyads(longer, starts, duration, noise=noise) for longer in drums)
-    return tuple(steady(run, after=after) for run in runs)

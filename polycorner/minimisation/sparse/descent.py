@@ -12,6 +12,8 @@ The functions with positive multipliers are a guess at the face of the minimum. 
 it, with the exact curvature, ends the descent: if it stays near, in the set, and no higher, with no
 negative multiplier.  Where the inertia of the KKT matrix shows negative curvature along the face,
 a Lanczos method finds a direction of it, and the descent goes on from a lower point there.
+
+Feasible points near a given one are found by projections, and by steps that lower the violation.
 """
 
 from dataclasses import dataclass
@@ -29,16 +31,7 @@ from polycorner.minimisation.sparse.optimality import (
     first_order,
     second_order,
 )
-from polycorner.minimisation.sparse.programmes import quadratic_step
-from polycorner.minimisation.sparse.restoration import (
-    inside,
-    linearised,
-    near,
-    projected,
-    restored,
-    violation,
-    worst,
-)
+from polycorner.minimisation.sparse.programmes import Linearised, elastic_step, quadratic_step
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH, Tolerances
@@ -49,6 +42,149 @@ FACTORS = (1.0, 0.5, 0.25, 0.125)  # parts of a step that are tried before the b
 CLOSE = 0.5  # step from which on Newton's method on the face is tried
 CORRECTIONS = 20  # of the face on which Newton's method is tried
 IDLE = 5  # steps without any promise after which a descent has stalled
+AROUND = 100.0  # box of a step on a flat face, in units of the violation
+FARTHEST = 10.0  # violation, in scale units, beyond which a projection is given up
+NONE = np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Restored:
+    """A feasible point, or the last point of a search whose violation is not zero.
+
+    ``stationary`` says that no step lowers the violation there to first order.
+    """
+
+    at: Point
+    feasible: bool
+    stationary: bool = False
+
+
+def violation(problem: Nonlinear, at: Point) -> Array:
+    """Return the distances ``(M,)`` by which constraints are missed."""
+    missed = abs(at.distances)
+    m = problem.inequalities
+    missed[:m] = np.maximum(-at.distances[:m], 0.0)
+    return missed
+
+
+def worst(problem: Nonlinear, at: Point) -> float:
+    """Return the largest violation; infinite where anything is not finite."""
+    return float(violation(problem, at).max(initial=0.0)) if at.is_finite else np.inf
+
+
+def near(problem: Nonlinear, at: Point, reach: float) -> Indices:
+    """Return the inequalities that a step in a box of the size ``reach`` can close."""
+    m = problem.inequalities
+    sums = abs(at.rows[:m]).sum(axis=1)
+    return np.flatnonzero(at.distances[:m] <= 1.2 * reach * sums + problem.tolerances.zero)
+
+
+def linearised(problem: Nonlinear, at: Point, kept: Indices, size: float) -> Linearised:
+    """Return the programme of some inequalities at a point, with the energy in units of ``size``.
+
+    What is missed by rounding counts as zero.
+    """
+    values = np.where(abs(at.distances) < problem.tolerances.zero, 0.0, at.distances)
+    own, rows = problem.equations, at.rows
+    return Linearised(
+        values[kept],
+        csr_array(rows[kept]),
+        values[own],
+        csr_array(rows[own]),
+        at.gradient / size,
+    )
+
+
+def projected(
+    problem: Nonlinear, at: Point, limit: int, held: Indices = NONE, *, onto: bool = False
+) -> Point | None:
+    """Return the point after Gauss-Newton steps onto the held functions and those that are missed.
+
+    The steps end in the set, up to what counts as zero, as the solver of the programmes is no more
+    accurate; with ``onto``, also where all held functions vanish.  None if they do not.
+    """
+    face, miss = held if onto else NONE, problem.tolerances.zero
+    missed = np.zeros(len(at.distances), dtype=np.bool_)
+    missed[problem.equations] = missed[held] = True
+    for _ in range(limit):
+        if worst(problem, at) <= miss and abs(at.distances[face]).max(initial=0.0) <= miss:
+            return at
+        # Never dropped again: a function that was missed once stays on the way onto the others.
+        missed |= violation(problem, at) > miss
+        chosen, n = np.flatnonzero(missed), len(at.place)
+        right = np.concatenate([np.zeros(n), -at.distances[chosen]])
+        try:
+            system = Saddle(eye_array(n), csr_array(at.rows[chosen]))
+            change = system.solve(right, np.zeros(len(right)))
+        except ValueError:
+            return None
+        if not np.isfinite(change).all():
+            return None
+        at = problem.at(at.place + change[:n])
+        if not worst(problem, at) < FARTHEST:
+            return None
+    return at if worst(problem, at) <= miss else None
+
+
+def restored(problem: Nonlinear, at: Point, limit: int) -> Restored:
+    """Lower the sum of violations by elastic programmes in a trust region until it vanishes."""
+    reach, miss = SEARCH.first_restoring, problem.tolerances.zero
+    total = float(violation(problem, at).sum())
+    for _ in range(limit):
+        # Near the set Newton's steps arrive at once; elastic programmes would creep.
+        if worst(problem, at) < 1e-3:
+            ended = projected(problem, at, 10)
+            if ended is not None:
+                return Restored(ended, feasible=True)
+        kept = np.flatnonzero(at.distances[: problem.inequalities] <= 2.4 * reach + miss)
+        kept = np.union1d(kept, near(problem, at, reach))
+        model = linearised(problem, at, kept, 1.0)
+        step = elastic_step(model, reach)
+        if step is None:
+            return Restored(at, feasible=False)
+        left = np.maximum(-(model.values + model.rows @ step), 0.0).sum()
+        left += abs(model.sections + model.section_rows @ step).sum()
+        # No model step lowers the violation to first order: evidence that nothing is feasible
+        # nearby.
+        if total - left <= 100 * problem.tolerances.stationary * total:
+            return Restored(at, feasible=False, stationary=True)
+        trial = problem.at(at.place + step)
+        after = float(violation(problem, trial).sum()) if trial.is_finite else np.inf
+        size = float(abs(step).max())
+        if after <= total - 0.1 * (total - left):
+            at, total = trial, after
+            reach = 2 * reach if size > 0.9 * reach else reach
+        else:
+            reach = 0.25 * min(reach, size)
+        if reach < SEARCH.least_box:
+            break
+    return Restored(at, feasible=worst(problem, at) <= miss)
+
+
+def inside(problem: Nonlinear, at: Point, held: Indices) -> Point:
+    """Return the nearest point of the set where held functions vanish, if a few steps lead there.
+
+    For a face that is flat, of which the point has been chosen by chance.
+    """
+    others = np.setdiff1d(np.arange(problem.inequalities), held)
+    for _ in range(5):
+        short = worst(problem, at)
+        if short <= problem.tolerances.feasible:
+            break
+        reach = AROUND * short
+        kept = others[at.distances[others] <= 10 * reach]
+        model = Linearised(
+            at.distances[kept],
+            csr_array(at.rows[kept]),
+            at.distances[held],
+            csr_array(at.rows[held]),
+            np.zeros(len(at.place)),
+        )
+        step = quadratic_step(model, csr_array(eye_array(len(at.place))), reach)
+        if step is None:
+            break
+        at = problem.at(at.place + step.displacement)
+    return at
 
 
 @dataclass(frozen=True)
@@ -99,6 +235,7 @@ class _Descent:
     def advanced(self) -> tuple[Array, Verdict | None] | None:
         """Take one step; return the end of the descent, if this is it, with its failure."""
         problem, at = self.problem, self.at
+        # With multipliers of the step before: those of this one are not known yet.
         curved = problem.hessian(at, self.multipliers, convex=True)
         size = max(float(abs(at.gradient).max()), float(abs(curved).max())) or 1.0
         kept = near(problem, at, self.reach)
@@ -108,8 +245,10 @@ class _Descent:
             return self.shrunk(self.reach)
         d, lam = step.displacement, step.multipliers
         gaps = model.values + model.rows @ d
+        # Functions out of reach have none, whatever they had before.
         self.multipliers[:] = 0.0
         self.multipliers[kept] = lam * size
+        # Complementarity: of a multiplier and a gap the smaller one is the one that is zero.
         held = kept[lam > gaps]
         moved = float(abs(d).max())
         promised = -float(model.gradient @ d + d @ (curved @ d) / (2 * size)) * size
@@ -117,6 +256,8 @@ class _Descent:
             ended = self.on_face_of(held) or self.on_face_of(self.basic(held), basic=True)
             if ended is not None:
                 return ended
+        # Near the end promises are smaller than rounding of the energy, and may not be held against
+        # it.
         noise = 1e-15 * (abs(at.energy) + size)
         self.idle = self.idle + 1 if promised <= noise else 0
         if self.idle > IDLE:
@@ -158,6 +299,7 @@ class _Descent:
         end = problem.at(u + d)
         if not end.is_finite:
             return None
+        # With the face if possible: otherwise each step would leave a curved wall and come back.
         found = projected(problem, end, 8, held) or projected(problem, end, 8)
         if found is None:
             return None
@@ -165,6 +307,7 @@ class _Descent:
         samples = min(SAMPLES, int(np.ceil(abs(way).max() / THICK)))
         m = problem.inequalities
         for k in range(1, samples):
+            # Values alone, sizes of gradients as at the start: this is asked at many points.
             depth = -problem.values(u + k / samples * way)[:m] / self.at.sizes[:m]
             if not depth.max(initial=0.0) <= THICK:
                 return None
@@ -243,6 +386,7 @@ class _Descent:
         way = way / abs(way).max()
         noise = 1e-14 * (abs(at.energy) + float(abs(at.gradient).max()))
         for push in SEARCH.pushes:
+            # A direction of negative curvature has no sign; the wall may be on either side.
             for sign in (1.0, -1.0):
                 ahead = self.problem.at(at.place + sign * push * way)
                 found = projected(self.problem, ahead, 10, held, onto=True)
@@ -279,8 +423,10 @@ def downward(hessian: csr_array, rows: csr_array) -> Array | None:
     operator: Any = LinearOperator(
         (n, n), matvec=lambda v: tangential(hessian @ tangential(v)), dtype=np.float64
     )
+    # The same start every time, and not orthogonal to what is sought.
     start = tangential(np.random.default_rng(0).standard_normal(n))
     try:
+        # Any direction of clearly negative curvature does: no eigenvector is needed.
         _, vectors = eigsh(operator, k=1, which="SA", v0=start, tol=1e-3)
     except ArpackError:
         return None

@@ -53,6 +53,7 @@ def on_corner(held: Evaluate, gradient: Array, q: Array) -> FacePoint | None:
         values, rows = held(q)
     if last > short:
         return None
+    # At a corner multipliers follow from the point, and take no part in Newton's method.
     lam = least_squares(rows, gradient)
     return None if lam is None else FacePoint(q, lam, last, float(abs(values).max(initial=0.0)))
 
@@ -83,6 +84,7 @@ def on_face(
         if (step >= 0.5 * last and step < 1e-9) or step <= 1e-16:
             break  # rounding: the point before is as good
         at, last = problem.at(at.place + change), step
+    # Where there are many, near those of Newton's method, as its Hessian belongs to these.
     final = multipliers_on(at, held, lam)
     if final is None or not is_stationary(problem, at, held, final):
         return None
@@ -118,6 +120,7 @@ def newton_step(
     hessian = _lagrangian(problem, at, held, lam)
     size = _size(at, hessian)
     n = len(at.gradient)
+    # The energy in units of its size, so that one regularisation suits all blocks.
     right = np.concatenate([-at.gradient / size, -at.distances[held]])
     start = np.concatenate([np.zeros(n), -lam / size])
     try:

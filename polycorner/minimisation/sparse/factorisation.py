@@ -32,6 +32,7 @@ def refined(lu: Any, matrix: Any, right: Array, *, transposed: bool = False) -> 
     way, applied = ("T", matrix.T) if transposed else ("N", matrix)
     x = lu.solve(right, trans=way)
     for _ in range(REFINEMENTS):
+        # SuperLU pivots for sparsity as well: what accuracy that costs is won back here.
         x += lu.solve(right - applied @ x, trans=way)
     return x if np.isfinite(x).all() else None
 
@@ -53,6 +54,7 @@ def negative_eigenvalues(matrix: Any) -> int | None:
     except RuntimeError:
         return None
     pivots = lu.U.diagonal()
+    # Pivots are those of a congruence only if rows and columns were exchanged alike.
     if not (lu.perm_r == lu.perm_c).all() or not np.isfinite(pivots).all():
         return None
     ones = np.ones(square.shape[0])
@@ -93,6 +95,7 @@ def rank(matrix: csr_array, tolerance: float) -> int | None:
 def least_squares(rows: csr_array, gradient: Array) -> Array | None:
     """Return ``lam`` with the least ``|g - A^T lam|``, for independent rows ``A``."""
     k, n = rows.shape
+    # The square system is much the smaller one.
     if k == n:
         return solved(rows, gradient, transposed=True)
     system = block_array([[eye_array(n), rows.T], [rows, None]], format="csc")

@@ -105,14 +105,12 @@ def multiplier_ranges(
     return ends
 
 
-def leads_down(
-    rows: csr_array, inequalities: int, gradient: Array, *, inward: float = 1e-3
-) -> bool:
+def leads_down(rows: csr_array, inequalities: int, gradient: Array) -> bool:
     """Whether a direction leads into the polyhedron and lowers the energy to first order.
 
-    Inward is what the functions grow by per scale unit, at least.
+    Into it is where the functions grow by a thousandth per scale unit, at least.
     """
-    empty = np.full(inequalities, -inward), rows[:inequalities]
+    empty = np.full(inequalities, -1e-3), rows[:inequalities]
     sections = np.zeros(rows.shape[0] - inequalities), rows[inequalities:]
     at = Linearised(*empty, *sections, gradient)
     found = step(at, np.ones(len(gradient)))

@@ -71,17 +71,14 @@ def step(at: Linearised, reach: Array) -> Step | None:
     return Step(found.x * size, -found.ineqlin.marginals * scale)
 
 
-def quadratic_step(
-    at: Linearised, hessian: csr_array, reach: float, *, proximal: float = 1e-7
-) -> Step | None:
+def quadratic_step(at: Linearised, hessian: csr_array, reach: float) -> Step | None:
     """Minimise ``g.d + d.B d / 2`` over ``f + A d >= 0``, ``h + C d = 0``, ``|d_i| <= reach``.
 
-    ``B`` has no negative eigenvalues; the curvature ``proximal`` is added, so that coordinates
-    which nothing moves stay.  The programme is stated in units of ``reach``, since
+    ``B`` has no negative eigenvalues.  The programme is stated in units of ``reach``, since
     tolerances of the solver are relative to sizes of one.  None where it fails.
     """
     n = len(at.gradient)
-    curved = reach * (hessian + proximal * eye_array(n))
+    curved = reach * (hessian + 1e-7 * eye_array(n))  # coordinates that nothing moves stay
     unit = eye_array(n, format="csr")
     rows = vstack([at.section_rows, -at.rows, unit, -unit], format="csc")
     right = np.concatenate([-at.sections / reach, at.values / reach, np.ones(2 * n)])

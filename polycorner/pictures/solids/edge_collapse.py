@@ -9,10 +9,10 @@ from polycorner.pictures.solids.charts import Chart
 from polycorner.pictures.solids.creases import Cut, edges_of
 from polycorner.pictures.solids.grids import Indices, Mask
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 # Edges shorter than the first number of cells are collapsed; none gets longer than the second.
 SHORT, LONG = 0.45, 1.8
-COINCIDENT = 1e-6
 # Faces of a lower shape are poor: 1 is equilateral, 0 degenerate, negative inverted.
 POOR = 0.2
 ROUNDS = 40
@@ -107,7 +107,7 @@ def _twins(cut: Cut) -> Indices:
         if len(low) and len(high):
             across = np.delete(np.arange(3), axis)
             away, found = cKDTree(cut.places[high][:, across]).query(cut.places[low][:, across])
-            near, other = np.asarray(away) < COINCIDENT, high[np.asarray(found)]
+            near, other = np.asarray(away) < DEFAULT.same, high[np.asarray(found)]
             twins[low[near]], twins[other[near]] = other[near], low[near]
     return twins
 
@@ -169,7 +169,7 @@ def _allowed(
     for way in (edges, edges[:, ::-1]):
         start = way[:, 0]
         free = (creases[start] == 0) | ((creases[start] == 2) & crease)
-        found.append(way[wanted & (free | (lengths < COINCIDENT))])
+        found.append(way[wanted & (free | (lengths < DEFAULT.same))])
     return np.concatenate(found)
 
 
@@ -206,7 +206,7 @@ def _no_worse(surface: Labelled, ways: Indices, shapes: Array) -> Mask:
     reach, goal = np.zeros(len(ways)), cut.places[ways[which, 1]]
     for corner in moved.T:
         np.maximum.at(reach, which, lengths_of(cut.places[corner] - goal))
-    still = lengths_of(np.subtract(*cut.places[ways.T])) < COINCIDENT
+    still = lengths_of(np.subtract(*cut.places[ways.T])) < DEFAULT.same
     flat = ~cut.active[ways[:, 0]].any(axis=1)  # inside a cap, where size makes no error
     return np.asarray(still | ((after >= np.minimum(before, POOR)) & (flat | (reach < LONG))))
 

@@ -46,6 +46,7 @@ def bordered(bent: Array, rows: Array) -> Array:
     n, k = bent.shape[1], rows.shape[1]
     found = np.zeros((len(bent), n + k, n + k))
     found[:, :n, :n], found[:, n:, :n] = bent, rows
+    # Not symmetric: with this sign the unknowns are multipliers as certificates state them.
     found[:, :n, n:] = -rows.transpose(0, 2, 1)
     return found
 
@@ -99,6 +100,7 @@ class FacesOfPoints:
         """Return the faces with some active inequalities ``(B, m)``."""
         counts = active.sum(axis=1)
         most = int(counts.max(initial=0))
+        # A stable sort brings the active ones to the front in the order of their rows.
         first = np.argsort(~active, axis=1, kind="stable")[:, :most]
         others = np.arange(problem.inequalities, problem.rows - 1)
         rows = np.hstack([first, np.broadcast_to(others, (len(active), len(others)))])
@@ -145,6 +147,7 @@ def newton(
     n, units, count = len(free), problem.scales[free], faces.rows.shape[1]
     start, reach = q, np.broadcast_to(reach, len(q))
     q, lam, found = q.copy(), np.zeros((len(q), count)), np.zeros(len(q), dtype=np.bool_)
+    # Points that have settled leave `going`: those that take longer cost no evaluations of them.
     going, unit = np.arange(len(q)), np.arange(n, n + count)
     for step in range(MOST_STEPS):
         values, gradients, hessians = problem.evaluate(q[going], 2)
@@ -155,6 +158,8 @@ def newton(
         slopes = faces.of_rows(going, gradients)[fine][:, :, free]
         pull, values = gradients[fine, -1][:, free], faces.of_rows(going, values)[fine]
         going, bends, bent = going[fine], bends[fine], bent[fine]
+        # Multipliers are those of least squares at the start: a bad guess of them would throw q far
+        # off.
         if step == 0 and count:
             lam[going] = np.einsum("bik,bi->bk", np.linalg.pinv(slopes), pull)
         weights = lam[going]
@@ -163,6 +168,8 @@ def newton(
         matrix[:, unit, unit] = faces.filled[going]
         balance = pull - np.einsum("bk,bki->bi", weights, slopes)
         change = solved(matrix, -np.concatenate([balance, values], axis=1))
+        # The step of the multipliers has other units, and does not tell whether a point has
+        # settled.
         length = abs(change[:, :n]).max(axis=1, initial=0.0)
         with np.errstate(divide="ignore"):
             # Far from a solution a step may leave the place where formulas are defined.
@@ -172,15 +179,17 @@ def newton(
         q[going[:, None], free] += change[:, :n] * units
         lam[going] += change[:, n:]
         away = abs((q[going] - start[going])[:, free] / units).max(axis=1, initial=0.0)
+        # A solution far from its start is that of another box, where it is found from nearby.
         found[going[(length < DEFAULT.rounding) & (away <= reach[going])]] = True
         going = going[(length >= DEFAULT.rounding) & (away <= 2 * reach[going])]
         if not going.size:
             break
+    # Of equations any sign will do, of inequalities positive ones alone: zeros are degenerate.
     most = count - (problem.rows - 1 - problem.inequalities)
     return q, found & ((lam > 0) | faces.filled)[:, :most].all(axis=1)
 
 
-def active_sets(weights: Array, pulls: Array, *, relevant: float = 1e-6) -> Mask:
+def active_sets(weights: Array, pulls: Array) -> Mask:
     """Return the functions ``(B, m)`` that balance the energy in nearest combinations.
 
     Parameters
@@ -189,13 +198,12 @@ def active_sets(weights: Array, pulls: Array, *, relevant: float = 1e-6) -> Mask
         Weights of the gradients, the energy's last.
     pulls : (B, m + 1) array
         Lengths of the gradients.
-    relevant : float, optional
-        Share of the largest force at which a function counts.
     """
     forces = weights * pulls
     most = forces.max(axis=1, keepdims=True, initial=0.0)
     with np.errstate(invalid="ignore"):
-        return np.asarray((forces[:, :-1] > relevant * most) & (most > 0))
+        # A smaller share of the largest force is what the nearest combination leaves of zero.
+        return np.asarray((forces[:, :-1] > 1e-6 * most) & (most > 0))
 
 
 @dataclass
@@ -231,6 +239,8 @@ class Screen:
         found = np.full((len(self.q), len(self.free)), np.nan)
         left = np.arange(len(self.q))
         for power in range(QUARTERINGS):
+            # The radii that `EnclosedFaces.reaches` tries, so that a guess fits one of its
+            # attempts.
             reach = np.minimum(widest[left], SEARCH.widest)[:, None] / 4**power * scales
             found[left] = self._widened(left, reach)
             left = left[np.isnan(found[left]).any(axis=1)]
@@ -249,6 +259,8 @@ class Screen:
             found[going[sure]] = here[sure]
             with np.errstate(invalid="ignore"):
                 more = ~sure & (images <= MOST_WIDENING * here).all(axis=1)
+            # Never narrower than before, and wider than the image by some margin, so that the next
+            # one fits.
             radii[going[more]] = np.maximum(here[more], GROWTH * images[more])
             going = going[more]
             if not going.size:
@@ -261,6 +273,7 @@ class Screen:
         g_lo, g_hi = (side[:, self.rows][:, :, self.free] for side in ends[:2])
         h_lo, h_hi = (side[:, self.rows][:, :, self.free][:, :, :, self.free] for side in ends[2:])
         with np.errstate(all="ignore"):
+            # Infinite ends give NaN here, which `_images` sorts out before it inverts anything.
             middles = [0.5 * (low + high) for low, high in ((g_lo, g_hi), (h_lo, h_hi))]
             radii = [0.5 * (high - low) for low, high in ((g_lo, g_hi), (h_lo, h_hi))]
         return (middles[0], radii[0]), (middles[1], radii[1])
@@ -277,11 +290,14 @@ class Screen:
         images, sure = np.full_like(radii, np.nan), np.zeros(len(which), dtype=np.bool_)
         which, g, g_rad, h, h_rad = which[fine], g[fine], g_rad[fine], h[fine], h_rad[fine]
         rows, rows_rad = g[:, :-1], g_rad[:, :-1]
+        # The steps of `faces.enclosed_multipliers` and `kkt.krawczyk`, in doubles and for many
+        # boxes.
         left = np.linalg.pinv(rows.transpose(0, 2, 1))
         lam = np.einsum("bij,bj->bi", left, g[:, -1])
         defect = np.eye(lam.shape[1]) - abs(left) @ rows_rad.transpose(0, 2, 1)
         pull = g_rad[:, -1] + np.einsum("bki,bk->bi", rows_rad, abs(lam))
         spread = solved(defect, np.einsum("bij,bj->bi", abs(left), pull))
+        # Multipliers get boxes twice as wide as their enclosure, as `faces.wider` makes them.
         rho = np.concatenate([radii[fine], 2 * spread], axis=1)
         weights = np.concatenate([-lam, np.ones((len(lam), 1))], axis=1)
         slopes, bends = self.start[0][which], self.start[1][which]
@@ -357,6 +373,8 @@ class Attempts:
                 chosen.append((e, e.where[e.rest.items[ripe]]))
         if not parts:
             return
+        # The limit is one for all chunks, so that it does not matter into how many boxes are
+        # divided.
         since = np.concatenate([e.boxes.since[boxes] for e, boxes in chosen])
         # Those that have waited longest; ties in the order of the boxes, whatever the threads did.
         order = np.argsort(-since, kind="stable")[:ATTEMPTS]
@@ -364,6 +382,7 @@ class Attempts:
         tried[order] = True
         place = 0
         for e, boxes in chosen:
+            # Those that had no turn keep their age, and are among the first in the next round.
             e.boxes.since[boxes[tried[place : place + len(boxes)]]] = 0
             place += len(boxes)
         self.run(Starts.joined(parts).part(order), mapped)
@@ -371,6 +390,8 @@ class Attempts:
     def _ripe(self, e: Examined) -> NDArray[np.intp]:
         """Return positions in the rest of the items to try, one for a box."""
         left = e.open_items
+        # Newton's method from a box and from its half leads to the same point: bisect a few times
+        # first.
         ripe = left[
             e.boxes.since[e.where[e.rest.items[left]]] >= EVERY * len(self.setting.domain.free)
         ]
@@ -384,6 +405,7 @@ class Attempts:
         active = active_sets(e.rest.weights[ripe], e.rest.pulls[ripe])
         still = np.zeros(len(ripe), dtype=np.bool_)
         if self.setting.may_have_loci:
+            # All components of the energy's derivative enclose 0: only there a locus can pass.
             still = ((e.rest.low[ripe, -1] <= 0) & (e.rest.high[ripe, -1] >= 0)).all(axis=1)
         return Starts(boxes.middles, active, SEARCH.surroundings * widths.max(axis=1), still)
 
@@ -393,6 +415,7 @@ class Attempts:
             return
         q = starts.q.copy()
         for i, side in self.setting.domain.held.items():
+            # Parameters are no unknowns: one value is polished, the enclosure covers all others.
             q[:, i] = 0.5 * sum(side)
         starts = replace(starts, q=q)
         if self.setting.may_have_loci:
@@ -429,6 +452,7 @@ class Attempts:
         points, found = newton(
             self.setting.problem, starts.q, starts.active, domain.free, starts.widest
         )
+        # A point beside the domain may close boxes at its side; one far off never does.
         found &= (points >= domain.lower - slack).all(axis=1)
         found &= (points <= domain.upper + slack).all(axis=1)
         return np.where(found[:, None], points, np.nan)

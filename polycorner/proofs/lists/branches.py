@@ -49,11 +49,13 @@ def items(conj: Mask, below: Mask, above: Mask) -> tuple[NDArray[np.intp], Mask]
     masks : (I, m) array
         The functions that are open there and have to hold in the branch.
     """
+    # An intersection needs no comparison of branches, and is the common case.
     if len(conj) == 1:
         inside: NDArray[np.intp] = np.flatnonzero(~(below & conj[0]).any(axis=1))
         return inside, ~above[inside] & conj[0]
     alive: Mask = ~np.any(below[:, None, :] & conj, axis=2)  # (B, c)
     open_: Mask = conj & ~above[:, None, :]  # (B, c, m)
+    # A branch inside another would be closed twice, and may fail where the larger one succeeds.
     kept = (_least_of_many if len(conj) > MANY else _least)(alive, open_)
     boxes, branches = np.nonzero(kept)
     return boxes, open_[boxes, branches]
@@ -75,6 +77,7 @@ def _least(alive: Mask, open_: Mask) -> Mask:
 def _least_of_many(alive: Mask, open_: Mask) -> Mask:
     """Return the same, from sets of functions as the bits of whole numbers."""
     kept: Mask = np.zeros_like(alive)
+    # Bits of whole numbers: quadratic in branches, but without arrays for each pair.
     packed = np.packbits(open_, axis=2)
     for box, branches in enumerate(alive):
         first: dict[int, int] = {}

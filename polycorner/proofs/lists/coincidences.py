@@ -59,9 +59,13 @@ def signs(faces: EnclosedFaces, place: Place, count: int) -> list[int]:
         found = [POSITIVE if v > 0 else NEGATIVE if v < 0 else OPEN for v in values]
         for row in place.rows:
             if row < count:
+                # Zero by construction: enclosures there contain 0 and decide nothing.
                 found[row] = ZERO
+        # Without a finite value the formula may not be defined there, and exact algebra would not
+        # say.
         left = [i for i, sign in enumerate(found) if sign == OPEN and values[i].is_finite()]
         if left:
+            # Once for all functions, and only if one is open: exact algebra is slow.
             exact = common_zero(faces, place) if place.unique else None
             for i in left:
                 shown = exact is not None and exact.vanishes(formulas, i)
@@ -86,6 +90,7 @@ def common_zero(faces: EnclosedFaces, place: Place) -> ExactPoint | None:
     if len(sought) > MOST_CONSTANTS:
         return None
     known = [number_in(x, sought, symbols) for x in place.point]
+    # The ball of a recognised constant has a radius of its own, and has to lie inside.
     wide = [x + ball(0, 2.0**-50) for x in place.point]
     for i, (w, p) in enumerate(zip(wide, known, strict=True)):
         if p is None or not w.contains(symbols.ball(p)):
@@ -97,6 +102,7 @@ def common_zero(faces: EnclosedFaces, place: Place) -> ExactPoint | None:
         x + ball(0, REACH) if p is None else symbols.ball(p)
         for x, p in zip(place.point, known, strict=True)
     ]
+    # Outside of the box the zero of the polynomials might be another one.
     if not all(map(_within, hull, place.lower.tolist(), place.upper.tolist())):
         return None
     symbols.places = {i: hull[i] for i in left}
@@ -107,9 +113,11 @@ def common_zero(faces: EnclosedFaces, place: Place) -> ExactPoint | None:
         return None
     chosen, zeros = list[int](), list[Polynomial]()
     for row, value in zip(place.rows, values, strict=True):
+        # A combination of those before vanishes with them, and would make the system too large.
         if not in_ideal(value, zeros):
             chosen.append(row)
             zeros.append(value)
+    # Krawczyk's operator needs as many equations as unknowns.
     if len(chosen) != len(left):
         return None
     if left:

@@ -41,15 +41,20 @@ def narrowed(
     least, most = lower.copy(), upper.copy()
     v_lo, v_hi, g_lo, g_hi = bounds
     with np.errstate(all="ignore"):
+        # A function of one branch alone may be negative where the set lies in another branch.
         for i in (*held, *zero):
             ends = [(v_hi[:, i], g_lo[:, i], g_hi[:, i])]
             ends += [(-v_lo[:, i], -g_hi[:, i], -g_lo[:, i])] if i >= m else []
             for above, low, high in ends:
                 used = (continuous[:, i] & (above >= 0))[:, None]
+                # Division and product round: a cut too far out costs a little volume, one too far
+                # in costs a point.
                 reach = above[:, None] / np.where(low > 0, low, -high) * (1 + 4 * UNIT)
                 reach += 4 * UNIT * (abs(lower) + abs(upper) + reach)
+                # fmax and fmin ignore NaN, which bounds of infinite slopes leave behind.
                 least = np.where(used & (low > 0), np.fmax(least, upper - reach), least)
                 most = np.where(used & (high < 0), np.fmin(most, lower + reach), most)
+    # The strip is examined like any box: the function must be seen to be negative on it.
     least = lower + (1 - KEPT) * (least - lower)
     most = upper - (1 - KEPT) * (upper - most)
     return np.stack([least, most])

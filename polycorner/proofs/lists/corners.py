@@ -312,8 +312,8 @@ def corners(
     singular otherwise: a cusp, a contact of two curves, an apex.
 
     Branch and bound over the box shows that there are no corners elsewhere
-    (:mod:`~polycorner.proofs.lists.levels`).  Singular corners are isolated by second order where
-    they have rational coordinates (:mod:`~polycorner.proofs.lists.tips`); what is not decided
+    (:mod:`~polycorner.proofs.lists.corner_search`).  Singular corners are isolated by second order
+    where they have rational coordinates (:mod:`~polycorner.proofs.lists.tips`); what is not decided
     is returned as boxes, and as points of which it is not known whether they are corners.
 
     Parameters

@@ -61,6 +61,7 @@ class Domain(Value):
     def misses(self, lower: Array, upper: Array, places: Sequence[int]) -> bool:
         """Whether a box in some coordinates lies outside, circles that are whole apart."""
         at = list(places)
+        # A whole circle has no sides, although the box of its coordinates has.
         whole = (self.upper - self.lower >= self.manifold.periods)[at]
         away = (upper < self.lower[at]) | (lower > self.upper[at])
         return bool((away & ~whole).any())
@@ -82,6 +83,7 @@ class Domain(Value):
         periods = np.array(self.manifold.periods)[at]
         circles = np.where(np.isfinite(periods), periods, 1.0)
         apart = 0.5 * (left + right) - 0.5 * (lower + upper)
+        # Of the images of a box around a circle only the nearest can lie inside.
         turn = np.where(np.isfinite(periods), np.round(apart / circles) * circles, 0.0)
         slack = ROUNDING * self.manifold.scale_array[at]
         inside = (lower + turn - slack >= left) & (upper + turn + slack <= right)
@@ -159,6 +161,7 @@ def _side(name: str, side: Any) -> tuple[float, float]:
     argument = f"box[{name!r}]"
     values = reals(argument, side)
     if values.ndim == 0:
+        # A number alone fixes a coordinate: both of its sides.
         values = np.array([values, values])
     if values.shape != (2,) or not np.isfinite(values).all():
         checks.refuse(argument, "a number, or two finite numbers", side)

@@ -105,9 +105,11 @@ def examine(setting: Setting, sharp: bool, boxes: Boxes) -> Examined:
     where, masks = where[meets[where]], masks[meets[where]]
     units = setting.domain.units
     found, v, weights = directions((g_lo, g_hi), where, masks, k, units, -1.0)
+    # Cheap bounds first: they close most boxes, and mean values need second derivatives.
     left = np.flatnonzero(~found)
     if sharp and left.size:
         which = np.unique(where[left])
+        # Written in place: all later tests of these boxes use the sharper bounds as well.
         g_lo[which], g_hi[which] = setting.functions.mean_value_gradients(
             boxes.lower[which], boxes.upper[which]
         )
@@ -129,6 +131,7 @@ def examine(setting: Setting, sharp: bool, boxes: Boxes) -> Examined:
     inner = np.stack([boxes.lower, boxes.upper])
     examined = Examined(images, boxes, where, masks, found.copy(), found, v, inner, kept)
     reconsider(setting, examined)
+    # Last, as it evaluates Hessians over what all other tests have left.
     if sharp and setting.minima_only:
         at = examined.rest.items[examined.open_items]
         saddles, v[at] = without_minima(setting, boxes, where[at], masks[at])
@@ -173,6 +176,7 @@ def reconsider(setting: Setting, examined: Examined, regions: int = 0, loci: int
                 0.0,
             )
             examined.done[at[into]] = True
+            # Without functions the locus closes the box by itself, and no direction is needed.
             stored = into & examined.masks[at].any(axis=1)
             examined.directed[at[stored]] = True
             examined.v[at[stored]] = u[stored]
@@ -190,11 +194,13 @@ def without_minima(
     low, high = boxes.lower[which], boxes.upper[which]
     bounds = setting.functions.mean_value_gradients(low, high, hessians=True)
     smooth = setting.functions.differentiable(low, high)
+    # Items with the same functions have arrays of one shape, and are treated together.
     kinds, kind = np.unique(masks, axis=0, return_inverse=True)
     for number, mask in enumerate(kinds):
         rows = [*np.flatnonzero(mask).tolist(), *range(m, setting.problem.rows)]
         at = np.flatnonzero(kind.ravel() == number)
         at = at[smooth[place[at]][:, rows].all(axis=1)]
+        # With as many functions as coordinates nothing is tangent to all of them.
         if at.size and len(rows) <= len(setting.domain.free):
             parts = tuple([side[place[at]][:, rows] for side in bounds])
             found[at], directions[at] = _bent(setting, parts)
@@ -216,11 +222,13 @@ def _bent(setting: Setting, bounds: tuple[Array, ...]) -> tuple[NDArray[np.bool_
     bends = 0.5 * (h_lo[at] + h_hi[at]) * np.outer(units, units)
     left = np.linalg.pinv(slopes[:, :-1].transpose(0, 2, 1))
     lam = np.einsum("bij,bj->bi", left, slopes[:, -1])
+    # The projector onto the tangent space; its complement adds eigenvalues 0, never negative ones.
     flat = np.eye(len(free)) - left.transpose(0, 2, 1) @ slopes[:, :-1]
     weights = np.concatenate([-lam, np.ones((len(at), 1))], axis=1)
     bent_form = flat.transpose(0, 2, 1) @ np.einsum("bk,bkij->bij", weights, bends) @ flat
     values, vectors = np.linalg.eigh(0.5 * (bent_form + bent_form.transpose(0, 2, 1)))
     likely = np.flatnonzero(values[:, 0] < 0)
+    # Rounded to what the tree stores, before the test: the checker sees these very numbers.
     at, start = at[likely], (vectors[likely, :, 0] * units).astype(np.float32).astype(np.float64)
     sides = tuple(side[at] for side in (g_lo, g_hi, h_lo, h_hi))
     found[at] = bent(sides, left[likely] * units, start)

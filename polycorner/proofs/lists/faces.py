@@ -188,8 +188,10 @@ class EnclosedFaces:
         free = list(self.free)
         for _ in range(WIDENINGS):
             found = self._shown(*self._sides(q, radii), rows, count)
+            # None: multipliers may vanish, or the middle is singular; a wider box mends neither.
             if found is None or isinstance(found, Region):
                 return found
+            # So wide an image is that of a nearly singular Jacobian; quarters of the box do better.
             if (found > MOST_WIDENING * radii[free]).any():
                 break
             radii[free] = np.maximum(radii[free], GROWTH * found)
@@ -211,6 +213,7 @@ class EnclosedFaces:
         if enclosed is None:
             return None
         forms, multipliers = enclosed
+        # Wider than the enclosure, which may be a point: the image has to lie strictly inside.
         unknowns = [*(box.hull[i] for i in self.free), *(wider(lam) for lam in multipliers)]
         found = self._image(forms, box, unknowns)
         if found is None:
@@ -244,6 +247,7 @@ class EnclosedFaces:
     ) -> "tuple[list[Ball], list[list[Ball]]] | None":
         """Return the image under Krawczyk's operator, and the Jacobian in the middle."""
         centre = [x.mid() for x in unknowns]
+        # The residual in the middle alone, the Jacobian on all of the box: that is the operator.
         residual, start = self._equations(forms, box, centre, kkt)
         inverse = middle_inverse(start)
         if inverse is None:
@@ -336,14 +340,17 @@ def inertia(rows: "list[list[Ball]]") -> tuple[int, int] | None:
     middle = np.array([[float(x.mid()) for x in row] for row in rows])
     if not np.isfinite(middle).all():
         return None
+    # Congruence by any regular matrix keeps the inertia, so that this one may be rounded.
     unit = np.sqrt(np.maximum(abs(middle).max(axis=1), 1e-300))
     vectors = np.linalg.eigh((middle + middle.T) / 2 / np.outer(unit, unit))[1] / unit[:, None]
     turn = matrix(vectors.tolist())
     form = (turn.transpose() * matrix(rows) * turn).tolist()
+    # Sylvester's law needs a regular matrix, and it is computed in doubles.
     if (turn.det()) == 0 or turn.det().contains(0):
         return None
     negative = positive = 0
     for i, row in enumerate(form):
+        # Gershgorin's circles, about numbers that are nearly the eigenvalues.
         radius = sum((abs(x) for j, x in enumerate(row) if j != i), ball(0))
         if row[i] > radius:
             positive += 1
@@ -366,6 +373,7 @@ def enclosed_multipliers(slopes: "list[list[Ball]]") -> "list[Ball] | None":
     if not np.isfinite(middle).all():
         return None
     try:
+        # Preconditioned by an approximate left inverse: the system is square and near the identity.
         left = matrix(np.linalg.pinv(middle.T).tolist())
         square = left * matrix(slopes[:-1]).transpose()
         return entries(square.solve(left * column(slopes[-1])))
@@ -383,5 +391,6 @@ def _double(value: object, towards: float) -> float:
 
     assert isinstance(value, Fraction)
     near = value.numerator / value.denominator
+    # Division of whole numbers rounds to nearest: half of the time the wrong way.
     off = Fraction(near) > value if towards < 0 else Fraction(near) < value
     return float(np.nextafter(near, towards)) if off else near

@@ -82,16 +82,20 @@ def motion(manifold: Manifold, apply: Callable[[Array], Array], argument: str) -
     with np.errstate(invalid="ignore"):
         turns = np.where(circle, 2 * at / np.where(circle, periods, 1.0), 0.0)
     halves = np.round(turns).astype(int) % 2
+    # An eighth of a period: the shortest difference of two images is that of the step itself.
     steps = 0.125 * np.where(circle, periods, 1.0)
     columns = np.array(
         [manifold.difference(np.asarray(apply(step * unit)), at) / step
          for step, unit in zip(steps, np.eye(n), strict=True)]
     )  # fmt: skip
+    # Whatever the map is, this is the signed permutation nearest to it; the probe below decides.
     order = abs(columns).argmax(axis=0)
     signs = np.sign(columns[order, np.arange(n)]).astype(int)
     found = Motion(tuple(order.tolist()), tuple(signs.tolist()), tuple(halves.tolist()))
+    # Coordinates that differ from each other: a wrong order or sign shows.
     probe = np.array([0.1 * (k + 1) / n for k in range(n)]) * steps
     error = abs(manifold.difference(np.asarray(apply(probe)), found(probe, manifold)))
+    # A circle goes to a circle of its period, and no coordinate is used twice.
     same = bool((periods[order] == periods).all()) and sorted(order.tolist()) == list(range(n))
     if not same or error.max() > DEFAULT.alike * max(1.0, abs(probe).max()):
         checks.refuse(
@@ -116,8 +120,10 @@ def closed(
             if new not in found:
                 found[new] = tuple(found[element][i] for i in p)
                 waiting.append(new)
+        # Checked as it grows: generators without a finite group would never end.
         if len(found) > MOST_ELEMENTS:
             checks.refuse("symmetry", f"a group of at most {MOST_ELEMENTS} elements", "more")
+    # An order of its own: saved searches must not depend on that of generators.
     ordered = sorted(found, key=lambda g: (g.order, g.signs, g.halves))
     return {g: found[g] for g in ordered if g != identity}
 
@@ -143,6 +149,7 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
         return None
     for h in d.equations:
+        # The zero set of -h is that of h, but -f >= 0 is another set than f >= 0.
         pairs = product(d.equations, (1, -1))
         if not any(sympy.expand(after[h] - s * before[k]) == 0 for k, s in pairs):
             return None
@@ -151,6 +158,7 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
         if not images:
             return None
         names[i] = images[0]
+    # The tree counts, too: the same functions may be joined by and, or by or.
     pieces = set(d.signs_to_pieces([0] * len(d.functions)))
     if {frozenset(names[i] for i in piece) for piece in pieces} != pieces:
         return None
@@ -173,6 +181,7 @@ def _exact_half(period: float) -> "sympy.Expr":
     if not np.isfinite(period):
         return sympy.Integer(0)
     turns = period / np.pi
+    # The double nearest to 2 pi stands for 2 pi; else sin(q + period) would not simplify.
     whole = sympy.pi * round(turns) if turns == round(turns) else sympy.Rational(period)
     return whole / 2
 
@@ -183,6 +192,7 @@ def _bound(f: SmoothFunction) -> "sympy.Expr":
 
     expression = f.expression
     pairs = zip(f.family.parameters, f.parameters, strict=True)
+    # Exact values of doubles: decimals of SymPy would be compared up to rounding.
     known = {name: sympy.Rational(value) for name, value in pairs}
     found = {s: known[s.name] for s in expression.free_symbols if s.name in known}
     return expression.xreplace(found)
@@ -201,13 +211,8 @@ def dropped(
     motions: Sequence[Motion],
     weights: Array,
     domain: Domain,
-    *,
-    margin: float = 1e-9,
 ) -> NDArray[np.bool_]:
-    """Return which boxes ``(B, n)`` a symmetry carries to others, see the module.
-
-    There ``w . q`` has to grow by a margin, in scale units.
-    """
+    """Return which boxes ``(B, n)`` a symmetry carries to others, see the module."""
     manifold = domain.manifold
     half = np.array(manifold.periods) / 2
     orders = np.array([g.order for g in motions])
@@ -221,7 +226,7 @@ def dropped(
         (orders, signs, shifts, back - weights),
         weights,
         (np.array(manifold.periods), *sides),
-        margin,
+        1e-9,  # scale units by which w . q has to grow, so that no chain of images is endless
     )
 
 

@@ -37,6 +37,8 @@ class GrowingRows:
     def add(self, row: Array) -> None:
         """Add a row."""
         if self._count == len(self._array):
+            # Doubling: regions come one by one, thousands of them perhaps, and are read as one
+            # array.
             self._array = np.concatenate([self._array, np.zeros_like(self._array)])
         self._array[self._count] = row
         self._count += 1
@@ -84,6 +86,7 @@ class Tried:
             return False
         found = self._rows[active].array
         near = (abs(found[:, :-1] - q) <= DEFAULT.alike * self.scales).all(axis=1)
+        # A much smaller region may be shown where a larger one was not.
         return bool((near & (found[:, -1] * AGAIN < widest) & (widest <= found[:, -1])).any())
 
     def items(self) -> list[tuple[tuple[int, ...], list[list[float]]]]:
@@ -106,6 +109,7 @@ class Known:
         self.regions: list[Region] = []
         self.loci: list[LocusRegion] = []
         self.missed: list[LocusRegion] = []  # loci without a point of the set
+        # Two tables: by active functions for points, and all in one for the tests of boxes.
         self._sides = Sides(dimension)
         self._all = GrowingRows(2 * dimension + inequalities)
         self._dimension = dimension

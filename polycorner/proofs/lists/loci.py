@@ -89,6 +89,7 @@ def locus(
     """
     units = scales[list(z)]
     with precision(BITS):
+        # The widest first, as a wide box closes more of the search at once.
         for power in range(QUARTERINGS):
             shown = _shown(formulas, z, q, units * SEARCH.widest / 4**power, held)
             if shown is not None:
@@ -123,6 +124,7 @@ def _shown(
     hessian = forms.evaluate(Box(hull), 2)[2][0]
     form = [[hessian[i][j] for j in places] for i in places]
     middle = matrix([[x.mid() for x in line] for line in form])
+    # If H' M + M' H is definite, every matrix in the enclosure H is regular.
     product = matrix(form).transpose() * middle
     if not is_definite((product + product.transpose()).tolist()):
         return None
@@ -152,6 +154,7 @@ def met(
     lower[:, z], upper[:, z] = place.sharp_lower, place.sharp_upper
     treated = 0
     while len(lower):
+        # A limit on work, not on proof: without a sample the list says that it is open.
         treated += len(lower)
         if treated > MOST_PIECES:
             return place
@@ -160,11 +163,13 @@ def met(
         low[:, z], high[:, z] = place.sharp_lower, place.sharp_upper
         for i, (least, most) in domain.held.items():
             low[:, i], high[:, i] = least, most
+        # In the middle of the piece along the locus, for all of z and all parameters.
         bounds = functions.values(low, high)[0][:, : conj.shape[1]]
         missed: Mask = np.any((bounds <= 0)[:, None, :] & conj, axis=2)
         inside = np.flatnonzero(~np.all(missed, axis=1))
         if inside.size:
             return replace(place, sample=middle[inside[0]])
+        # Pieces that miss the set in every branch are dropped; when none is left, all of it does.
         bounds = functions.values(lower, upper)[1][:, : conj.shape[1]]
         missed = np.any((bounds < 0)[:, None, :] & conj, axis=2)
         left = ~np.all(missed, axis=1)

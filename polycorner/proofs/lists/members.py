@@ -96,8 +96,10 @@ def same(search: BoxSearch, one: RegionPoint, other: RegionPoint, least: int = 0
     """
     if apart(search, one.region, other.region):
         return False
+    # From both sides: either box may be the narrower one, or have more functions known.
     for here, there in ((one, other), (other, one)):
         rows = frozenset(there.region.active)
+        # A function of the other point is not zero here: they differ.
         if rows - here.zeros - here.unknown:
             return False
         known = len(rows) >= least and rows <= here.zeros
@@ -259,6 +261,7 @@ def image(search: BoxSearch, region: Region, g: Motion, p: tuple[int, ...]) -> R
 def moved(g: Motion, lower: Array, upper: Array, manifold: Manifold) -> tuple[Array, Array]:
     """Return the sides of a box's image, shifts rounded outwards."""
     ends = g.signs * np.array([lower, upper])[:, list(g.order)]
+    # A sign of -1 exchanges the ends.
     lower, upper = np.sort(ends, axis=0)
     return _shifted(lower, upper, g.shifts(manifold))
 
@@ -272,6 +275,7 @@ def _turn(q: Array, manifold: Manifold) -> Array:
 
 def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
     """Return a box moved by the multiples of half periods that a shift rounds, outward."""
+    # A multiple of pi as a double is off by half a unit, and so is the sum.
     slack = np.where(shift != 0, np.spacing(abs(shift)), 0.0)
     below, above = lower + shift - slack, upper + shift + slack
     return (

@@ -96,6 +96,7 @@ def pinned(faces: EnclosedFaces, q: Array, slopes: Array, widest: float) -> Pinn
     corner = _independent(slopes)
     if corner is None:
         return None
+    # The point is that of n of the functions; the others vanish there exactly, or are left out.
     around = faces.vertex(q, corner, widest)
     if around is None:
         return None
@@ -106,6 +107,7 @@ def pinned(faces: EnclosedFaces, q: Array, slopes: Array, widest: float) -> Pinn
             point[i] = x
         place = Place(point, around.lower, around.upper, corner)
         found = signs(faces, place, faces.inequalities)
+        # Functions that are open are no harm: items in which they may vanish are not closed.
         zeros = tuple(i for i, sign in enumerate(found) if sign == ZERO)
         return _within(faces, (*zeros, faces.inequalities), corner, point, widest)
 
@@ -135,6 +137,7 @@ def _within(
     if guess is None:
         return None
     steps, weights = guess
+    # Before any box: the weights belong to the point, and are the same for all of them.
     exact = _corrected(slopes, steps, weights)
     if exact is None:
         return None
@@ -144,6 +147,7 @@ def _within(
         lower, upper = middle - radii, middle + radii
         box = enclosing(lower, upper)
         reach = [(box.hull[i] - point[i]).abs_upper() for i in free]
+        # In a box with a kink Taylor's theorem does not hold; a smaller one may be without.
         found, share = faces.formulas.smooth(box, rows), None
         if not isinstance(found, Undecided):
             into = _into(found, box, free, reach)
@@ -158,14 +162,14 @@ def _within(
     return None
 
 
-def _guessed(slopes: Array, scales: Array, *, least: float = 1e-4) -> tuple[Array, Array] | None:
+def _guessed(slopes: Array, scales: Array) -> tuple[Array, Array] | None:
     """Return the largest steps and their weights, approximately; None if there are none."""
     from scipy.optimize import linprog
 
     g, pull = slopes[:-1] * scales, slopes[-1] * scales
     (count, n), sizes = g.shape, np.linalg.norm(g, axis=1)
     # No weight of 0: the exact correction that follows may make it negative.
-    smallest = least * np.linalg.norm(pull) / sizes.max()
+    smallest = 1e-4 * np.linalg.norm(pull) / sizes.max()
     steps, weights = np.zeros(2 * n), np.zeros((2 * n, count))
     for k in range(2 * n):
         sign, j = 1 - 2 * (k // n), k % n
@@ -196,10 +200,12 @@ def _corrected(
         total = entries(g.transpose() * column(row))
         right.append([a - b for a, b in zip(wanted, total, strict=True)])
     try:
+        # The shortest correction, as there are more weights than equations.
         change = middle * (g.transpose() * middle).solve(matrix(right).transpose())
     except ZeroDivisionError:
         return None
     found = (matrix(weights.tolist()) + change.transpose()).tolist()
+    # For balls x >= 0 means for certain.
     return found if all(x >= 0 for row in found for x in row) else None
 
 
@@ -209,6 +215,7 @@ def _combination(exact: "list[list[Ball]]", steps: Array, n: int) -> "list[Ball]
     for j in range(n):
         up, down = ball(steps[j]), ball(steps[n + j])
         pairs = zip(total, exact[j], exact[n + j], strict=True)
+        # Weighted by the other step, t e_j and -t' e_j cancel: what is left is dE.
         total = [m + (down * a + up * b) / ((up + down) * n) for m, a, b in pairs]
     return total
 
@@ -231,6 +238,7 @@ def _into(forms: SmoothForms, box: Box, free: Sequence[int], reach: "list[Ball]"
     most = bends.max(initial=0.0)
     if not (np.isfinite(slopes).all() and np.isfinite(most)):
         return np.zeros(len(free))
+    # A little for functions without curvature, too: they have to increase as well.
     wanted = bends / most + 0.01 if most > 0 else np.ones_like(bends)
     scale = np.linalg.norm(slopes[:-1], axis=1) @ wanted / (wanted @ wanted)
     found: Any = linprog(
@@ -253,6 +261,7 @@ def _shown(
     *grows, pull = [dot([g[i] for i in free], into.tolist()) for g in forms.evaluate(box, 1)[1]]
     if not all(x > 0 for x in grows):
         return None
+    # Where the energy falls along u there is no loss, and no gain is taken from it.
     most = max(pull.upper(), ball(0))
     loss = max((r / x * most).upper() for r, x in zip(bends, grows, strict=True))
     shares: list[float] = []

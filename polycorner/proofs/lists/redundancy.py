@@ -61,12 +61,14 @@ def close_redundant(setting: Setting, e: Examined) -> list[Starts]:
         if not _smooth(setting, e, item):
             continue
         sets = largest_sets(setting, e, item)
+        # Each set lies in a region around the box, so that nothing is left to show.
         if not len(sets):
             e.done[item] = True
             continue
         found, v = _directions(setting, e, box, sets)
         if found.all():
             e.done[item] = True
+            # One direction for each set: the box is closed by all of them together.
             e.further.append((box, v))
         else:
             missing.append(starts(setting, e, box, sets[~found]))
@@ -91,8 +93,10 @@ def _candidates(setting: Setting, e: Examined) -> Iterator[int]:
         (e.boxes.lower, e.boxes.upper), e.where[items], anything, *setting.known.sides()
     )
     holding = active_sets(e.rest.weights[left], e.rest.pulls[left]).sum(axis=1)
+    # An item that was just tried without success, though too many functions hold it.
     chosen |= (holding > top) & (e.boxes.since[e.where[items]] == 0)
     for item in items[chosen][:MOST_ITEMS].tolist():
+        # Bisection thins out the functions of an item; later there are fewer sets.
         if comb(int(e.masks[item].sum()), top) <= MOST_SETS:
             yield item
 
@@ -110,6 +114,7 @@ def largest_sets(setting: Setting, e: Examined, item: int) -> Mask:
     """Return the largest sets of functions that no region around the box has, ``(T, m)``."""
     lower, upper = e.boxes.lower[e.where[item]], e.boxes.upper[e.where[item]]
     (left, right), active = setting.known.sides()
+    # Fixed coordinates and parameters have no width, and are the same everywhere.
     within = (left < lower) & (upper < right) | (left == right)
     around = active[within.all(axis=1)]
     rows = np.flatnonzero(e.masks[item]).tolist()
@@ -152,6 +157,7 @@ def pin(setting: Setting, e: Examined, attempts: Attempts) -> None:
     counts = e.masks[e.rest.items[left]].sum(axis=1)
     tried = e.boxes.since[e.where[e.rest.items[left]]] == 0
     left = left[e.rest.smooth[left] & (counts > len(free)) & tried][:MOST_ITEMS]
+    # What `pinned` shows is shown for one intersection without equations.
     if len(setting.conj) > 1 or setting.equations or setting.domain.parameters or not left.size:
         return
     items = e.rest.items[left]
@@ -165,6 +171,7 @@ def pin(setting: Setting, e: Examined, attempts: Attempts) -> None:
         q[:, free] += step * units[free]
     values, slopes = _vanishing(setting, q, masks)
     sizes = abs(slopes).max(axis=(1, 2), initial=0.0)
+    # A guess only: whether they all vanish is decided exactly, in `pinned`.
     fine = abs(values).max(axis=1, initial=0.0) <= DEFAULT.feasible * sizes
     fine &= (abs(q - boxes.middles) / units)[:, free].max(axis=1) <= STRAY * widths
     for i in np.flatnonzero(fine):

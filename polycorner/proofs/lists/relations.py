@@ -62,10 +62,12 @@ def relation(problem: Problem, rows: Sequence[int]) -> Relation | None:
     rng = np.random.default_rng(0)
     points = rng.uniform(-1, 1, (len(every) + MORE, problem.dimension)) * problem.scales
     with np.errstate(all="ignore"):
+        # More points than functions: a relation at all of them is hardly an accident.
         values = np.array([problem.evaluate(q, 0)[0][every] for q in points])
     if not np.isfinite(values).all():
         return None
     sizes, vectors = np.linalg.svd(values)[1:]
+    # No relation in numbers: formulas are not expanded, which is slow.
     if not sizes[-1] <= DEFAULT.alike / 10 * sizes[0]:
         return None
     # The largest weight becomes 1, so that the others are likely to be small fractions.
@@ -77,6 +79,7 @@ def relation(problem: Problem, rows: Sequence[int]) -> Relation | None:
         sympy.Rational(w.numerator, w.denominator) * expanded(functions[i])
         for i, w in zip(every, weights, strict=True)
     )
+    # Expanding shows zero only, never that something is not: None says nothing.
     if not held or sympy.expand(total, deep=True) != 0:
         return None
     own = [w for w in weights[: len(rows)] if w]
@@ -120,6 +123,7 @@ def _pieces(polyhedron: Polyhedron, literals: list[Literal]) -> Pieces:
     branches: dict[frozenset[int], list[frozenset[Literal]]] = {}
     for mask in conjunctions(polyhedron):
         required = {literals[i] for i in np.flatnonzero(mask)}
+        # f >= 0 and -f >= 0 in one branch.
         held = frozenset(i for i, sign in required if i < m and (i, -sign) in required)
         rest = frozenset(one for one in required if one[0] < m and one[0] not in held)
         branches.setdefault(held, []).append(rest)
@@ -135,6 +139,7 @@ def _has_equations(literals: list[Literal], m: int) -> bool:
 
 def _of_the_first(polyhedron: Polyhedron, literals: list[Literal]) -> Polyhedron:
     """Return the set with the first of positive multiples in the place of each of them."""
+    # The first, so that names of a list do not depend on how multiples were found.
     first = [literals.index(one) for one in literals[: len(polyhedron.functions)]]
     if first == list(range(len(first))):
         return polyhedron
@@ -182,6 +187,7 @@ def _literals(polyhedron: Polyhedron) -> list[Literal]:
         values = np.vstack([polyhedron.values(points).T, polyhedron.equation_values(points).T])
         units = values / np.linalg.norm(values, axis=1, keepdims=True)
     found: dict[int, Literal] = {}
+    # Equations first: a multiple of one is dropped for its sake, not the other way round.
     for j in (*range(m, m + stated), *range(m)):
         found[j] = (j, 1)
         for i in [i for i, (first, _) in found.items() if first == i and i != j]:
@@ -198,6 +204,7 @@ def _multiple(f: "SmoothFunction", g: "SmoothFunction") -> int:
 
     one, other = expanded(f), expanded(g)
     ratio = sympy.cancel(one / other) if other != 0 else sympy.Integer(0)
+    # An unknown sign (None) is not good enough: the set would change with it.
     if not (ratio.is_number and (ratio.is_positive or ratio.is_negative)):
         return 0
     if sympy.expand(one - ratio * other, deep=True) != 0:

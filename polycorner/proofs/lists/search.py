@@ -139,6 +139,7 @@ class BoxSearch(Setting, ABC):
         stopped: Callable[[], bool] = lambda: False,
     ) -> None:
         """Treat boxes until none waits, ``most`` were treated, or time is up; or until stopped."""
+        # Time is looked at between rounds alone, so that it never changes what a round does.
         end = time.monotonic() + seconds
         with pool(workers) as executor:
             mapped: Mapped = map
@@ -162,6 +163,7 @@ class BoxSearch(Setting, ABC):
     def _chunks(self) -> list[Boxes]:
         """Return the last boxes that wait, in chunks of a size that the problem determines."""
         numbers = self.problem.rows * self.problem.dimension
+        # By the problem and not by the number of threads: results must not depend on these.
         largest = max(LEAST, min(CHUNK, NUMBERS // numbers))
         count = min(len(self.waiting), CHUNKS * largest)
         size = min(largest, max(LEAST, -(-count // CHUNKS)))
@@ -178,6 +180,7 @@ class BoxSearch(Setting, ABC):
         self.tally.covered += closed - t.descending
         self.tally.descending += t.descending
         nothing = np.zeros((0, t.boxes.lower.shape[1]))
+        # Images of other boxes are closed without a reason of their own: the symmetry is one.
         self.tree.close(t.images, t.images[:0], nothing)
         vectors = nothing if t.vectors is None else t.vectors
         self.tree.close(t.boxes.nodes[~t.left], t.boxes.nodes[t.owners], vectors)
@@ -261,6 +264,8 @@ class StationarySearch(BoxSearch):
         if len(self.regions) > regions or len(self.loci) > loci:
             for e in found:
                 reconsider(self, e, regions, loci)
+        # After all regions of the round are known, since a region of a face closes the item at
+        # once.
         starts = [start for e in found for start in close_redundant(self, e)]
         if starts:
             self.attempts.run(Starts.joined(starts), mapped)

@@ -113,6 +113,7 @@ def _file(place: str, value: Any) -> None:
     kind, _, rest = forms.text(place, value).partition("-")
     choice(place, kind, ("tree", "boxes"))
     number = rest.removesuffix(".npz")
+    # Names come from a file that others may have written: no path leads out of the folder.
     if not (number.isascii() and number.isdigit() and len(number) < 10):
         refuse(place, "the name of a file with a number", value)
 
@@ -128,6 +129,7 @@ def check_tree(records: Mapping[str, Any], before: Tree, n: int) -> None:
         position("nodes", nodes, shape=(-1,))
         forms.array("axes", axes, "i", nodes.shape, least=0, most=n - 1)
         forms.array("positions", positions, "f", nodes.shape)
+        # The numbering of `Tree.split`: a forged one could make a box its own half.
         expected = before.count + 2 * np.arange(len(nodes))
         if first.shape != expected.shape or (first != expected).any():
             refuse("first", "two boxes for each that is split", "others")
@@ -155,6 +157,7 @@ def check_leaves(tree: Tree, boxes: Sequence[Boxes]) -> None:
     done = tree.records()
     parts = [done.get(name, np.zeros(0, dtype=np.int64)) for name in (SPLIT[0], "closed")]
     every = np.concatenate([*parts, *(part.nodes for part in boxes)])
+    # A box that is missing would count as searched: the list would be complete by mistake.
     if len(every) != tree.count or len(np.unique(every)) != len(every):
         whole("boxes", len(np.unique(every)), least=tree.count)
         refuse("boxes", "each of them once", "some twice")
@@ -185,6 +188,7 @@ class SearchStore:
         self._files: dict[str, str] = {}  # digests by name
         self._marks, self._count = (0, 0), 0
         self._clock = searches.Clock(self._save)
+        # As it comes back from a file: tuples are lists there.
         self._stated = json.loads(json.dumps(_stated(search)))
         found = self._found()
         with _writing(self.path):
@@ -282,6 +286,7 @@ class SearchStore:
                 arrays = read_arrays(content)
                 if name.startswith("tree"):
                     check_tree(arrays, search.tree, n)
+                    # Pieces of a tree are put together in the order in which they were written.
                     search.tree.extend(arrays)
                     continue
                 search.waiting = _boxes(arrays, "waiting")

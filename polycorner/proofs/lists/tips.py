@@ -79,6 +79,7 @@ def tips(faces: EnclosedFaces, q: Array, open_: Sequence[int], reach: float) -> 
         How far the corner may be, in scale units.
     """
     with precision(BITS):
+        # An exact point must be guessed: an enclosure never shows that gradients are dependent.
         near = _approximate(faces, q, open_)
         if near is None or (abs(near - q) > reach * faces.scales).any():
             return
@@ -116,8 +117,10 @@ def _approximate(faces: EnclosedFaces, q: Array, open_: Sequence[int]) -> Array 
         missed = np.array([float(x.mid()) for x in values])
         if not (np.isfinite(slopes).all() and np.isfinite(missed).all()):
             return None
+        # Dependent gradients: convergence is linear, and least squares takes the shortest step.
         step = np.linalg.lstsq(slopes * faces.scales[free], -missed, rcond=1e-9)[0]
         q[free] += step * faces.scales[free]
+        # Rounding of the step itself; what `_rational` needs is a few digits less.
         if abs(step).max(initial=0.0) < 1e-14:
             break
     return q
@@ -127,6 +130,7 @@ def _rational(faces: EnclosedFaces, near: Array, reach: float) -> Iterator[Exact
     """Yield points with small denominators near one, the smallest first."""
     fixed = set(range(len(near))) - set(faces.free)
     seen = set()
+    # Small denominators first: of two fractions within reach the simpler one is meant.
     for most in DENOMINATORS:
         numbers = [Fraction(x) for x in near.tolist()]
         point = tuple(
@@ -155,11 +159,14 @@ def _vanishing(
     found = evaluate(forms.graph, [*forms.outputs, *slopes], inputs, Symbols())
     numbers = [None if p is None else algebra.constant(p) for p in found]
     values, n = numbers[: len(rows)], len(faces.free)
+    # None (not a number that algebra knows) counts as different from 0, which is safe.
     if any(value != 0 for value in values[len(open_) :]):
         return None, []
     active, gradients = [], []
     for r, value in enumerate(values):
         gradient = numbers[len(rows) + n * r : len(rows) + n * (r + 1)]
+        # One whose value is no number that algebra knows is left out: the others may isolate the
+        # point.
         if value == 0:
             if any(x is None for x in gradient):
                 return None, []
@@ -176,6 +183,7 @@ def _isolated(
 
     if not slopes:
         return None
+    # Relations are rational as the gradients are, found without any rounding.
     relations = [
         tuple([Fraction(int(x.p), int(x.q)) for x in v])
         for v in sympy.Matrix(
@@ -193,6 +201,7 @@ def _isolated(
         hessians = _hessians(forms, box, faces.free)
         away = [box.hull[i] - ball(point[i]) for i in faces.free]
         for relation in chosen:
+            # Any w proves it; sizes of the two parts of Q tell where one may be found.
             for weight in _weights(hessians, slopes, relation):
                 if isolates(hessians, slopes, away, relation, weight):
                     ends = np.array([outward(ball(point[i])) for i in faces.free])
@@ -218,6 +227,7 @@ def _relations(basis: list[Exact]) -> list[Exact]:
     for u, v in pairwise(basis):
         # Where no relation is definite by itself, a sum or a difference may be.
         every += [tuple(a + s * b for a, b in zip(u, v, strict=True)) for s in (1, -1)]
+    # Both signs: Q has to be positive, and a relation has no sign of its own.
     return [tuple(s * x for x in relation) for relation in every for s in (1, -1)]
 
 
@@ -248,4 +258,5 @@ def isolates(
         ]
         for i in range(n)
     ]
+    # Balls of equal numbers need not be equal; only the symmetric part matters for d' Q d.
     return is_definite([[(form[i][j] + form[j][i]) / 2 for j in range(n)] for i in range(n)])

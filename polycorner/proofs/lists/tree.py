@@ -73,12 +73,14 @@ class Tree:
     def close(self, nodes: NDArray[np.int64], owners: NDArray[np.int64], directions: Array) -> None:
         """Record boxes as closed, and directions ``(I, n)`` for some nodes, ``owners``."""
         self._closed.append(nodes)
+        # The tests of boxes have used directions of single precision: nothing is rounded here.
         self._directions.append((owners, directions.astype(np.float32)))
 
     def split(
         self, nodes: NDArray[np.int64], axes: NDArray[np.intp], positions: Array
     ) -> NDArray[np.int64]:
         """Record boxes as split; return the numbers of the first halves, the second follow them."""
+        # The second half of a node has the next number, so that one number stores both.
         first = self.count + 2 * np.arange(len(nodes))
         self._split.append((nodes, axes.astype(np.int8), positions, first))
         self.count += 2 * len(nodes)
@@ -126,6 +128,7 @@ class Tree:
         directions : (I, n) array
             All of them, in this order.
         """
+        # What is neither split nor closed waits, or is undecided.
         codes = np.full(self.count, OPEN, dtype=np.int8)
         where, first = np.zeros(self.count), np.zeros(self.count, dtype=np.int64)
         for nodes, axes, positions, children in self._split:
@@ -139,8 +142,10 @@ class Tree:
         joined = np.concatenate(vectors) if vectors else np.zeros((0, n), np.float32)
         rank = np.empty(self.count, dtype=np.int64)
         rank[order] = np.arange(len(order))
+        # A node may have no direction (outside, or in a region) or several, one for each branch.
         counts = np.bincount(owners, minlength=self.count)[order]
         ordered = codes[order]
+        # Stable, as directions of one node belong to its branches in their order.
         by_rank = np.argsort(rank[owners], kind="stable")
         return (
             ordered,
@@ -160,5 +165,6 @@ def _preorder(codes: NDArray[np.int8], first: NDArray[np.int64]) -> NDArray[np.i
         order[place] = node
         place += 1
         if split[node]:
+            # The first half is popped next, so it is pushed last.
             waiting += [children[node] + 1, children[node]]
     return order[:place]

@@ -10,7 +10,6 @@ from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.singles import (
     Mean,
     follow,
-    heading_decay,
     keel_of,
     keel_ratio,
     onset_azimuths,
@@ -71,13 +70,6 @@ def test_backwards_the_region_is_mirrored():
     first = {e.bodies[0]: e.time for e in reversed(began)}
     reached = [-0.04 + back.spin * first[k] for k in range(len(HEADINGS))]
     assert reached == pytest.approx(onset_azimuths(back, -HEADINGS), abs=1e-3 * DRUM.spin)
-
-
-def test_without_noise_headings_stay_and_with_it_they_decay():
-    quiet, loud = heading_decay(DRUM, math.radians(12), (0.0, 0.5), duration=15.0, count=4)
-    assert abs(quiet.rate.value) < 1e-8
-    assert loud.rate.value < -3 * loud.rate.error < 0
-    assert loud.climb_rate.value < quiet.climb_rate.value
 
 
 def test_a_keel_is_lost_when_sliding_is_as_easy_as_rolling():

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from polycorner.motion.engine import sets
-from polycorner.motion.friction import CutDisc, Disc, Ellipse, Interval
-from polycorner.motion.polygons import ConvexPolygon
+from polycorner.motion.friction import ConvexPolygon, CutDisc, Disc, Ellipse, Interval
 
 SQUARE = ConvexPolygon([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])
 EDGES = {  # how far a force (load, x, y) is from the boundary: a product, from the definition
