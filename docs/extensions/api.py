@@ -141,7 +141,8 @@ GROUPS = (
         "Sets and energies that are ready-made.",
         {
             "models": "Tutorial Pinball SphereCluster TorusDisks CriticalConfiguration "
-            "CriticalSearch PeriodicPacking JammedPacking",
+            "CriticalSearch PeriodicPacking JammedPacking CirclesIn SpheresInCube PointsOnSphere "
+            "basin_hopping BasinHopping read_coordinates CoordinateTable",
         },
     ),
     Group(
