@@ -1,7 +1,7 @@
 """``polycorner atlas``: corners, edges and faces of a model, and how they are joined."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,8 +19,13 @@ from polycorner.cli.search import (
 )
 
 if TYPE_CHECKING:
-    from polycorner.models.pinball import Pinball
-    from polycorner.models.tutorial import Tutorial
+    from collections.abc import Callable
+
+    from polycorner.pictures.regions import Labelled
+    from polycorner.polyhedra.polyhedron import Polyhedron
+    from polycorner.skeletons.elements import Skeleton
+
+    Starts = Callable[[Any], Any]
 
 STARTS = 60  # random points from which a search in the plane descends
 CROWDED = 12  # corners above which a picture is clearer without their names
@@ -84,7 +89,8 @@ def tutorial(begin: Begin) -> None:
     """List the sides of a planar region with seven corners."""
     from polycorner.models.tutorial import Tutorial
 
-    _planar(begin("tutorial", {}), Tutorial())
+    region = Tutorial()
+    planar(begin("tutorial", {}), region.polyhedron, lambda rng: region.starts(rng, STARTS))
 
 
 @atlas.command(epilog=_epilog("pinball --seed 1 --json"))
@@ -93,7 +99,8 @@ def pinball(begin: Begin) -> None:
     """List the walls of a pinball board with pins, wedges and cups."""
     from polycorner.models.pinball import Pinball
 
-    _planar(begin("pinball", {}), Pinball())
+    board = Pinball()
+    planar(begin("pinball", {}), board.polyhedron, lambda rng: board.starts(rng, STARTS))
 
 
 @atlas.command(
@@ -143,24 +150,38 @@ def disks(count: int, torus: str, seed: int, resume: bool, as_json: bool, out: P
     search.finish(answer, draw, critical_sheet)
 
 
-def _planar(search: SkeletonSearch, model: "Tutorial | Pinball") -> None:
-    found = search.run(model.polyhedron, lambda rng: model.starts(rng, STARTS), None)
+def skeletal(search: SkeletonSearch, polyhedron: "Polyhedron", starts: "Starts") -> None:
+    """Search a polyhedron and report it without a picture."""
+    found = search.run(polyhedron, starts, None)
+    search.finish(search.answer(found, {}), lambda _: [])
+
+
+def planar(search: SkeletonSearch, polyhedron: "Polyhedron", starts: "Starts") -> None:
+    """Search a region of the plane and report it with a picture."""
+    found = search.run(polyhedron, starts, None)
 
     def draw(folder: Path) -> list[Path]:
-        import numpy as np
+        from polycorner.pictures import style
 
-        from polycorner.pictures import regions, style
-        from polycorner.skeletons.search import traced
-
-        curves = [traced(found, edge) for edge in found.edges]
-        low, high = np.vstack(curves).min(axis=0), np.vstack(curves).max(axis=0)
-        margin = 0.06 * (high - low).max()
-        crowded = len(found.corners) > CROWDED
-        corners = [
-            ("" if crowded else label(k), corner.point) for k, corner in enumerate(found.corners)
-        ]
-        window = (low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin)
-        figure = regions.draw_region(model.polyhedron, window, corners=corners, edges=curves)
-        return [style.save(figure, folder / f"{search.model}.png")]
+        return [style.save(region_picture(polyhedron, found), folder / f"{search.model}.png")]
 
     search.finish(search.answer(found, {}), draw)
+
+
+def region_picture(polyhedron: "Polyhedron", found: "Skeleton", points: "Labelled" = ()) -> Any:
+    """Return the picture of a region with its corners and edges, and points with names."""
+    import numpy as np
+
+    from polycorner.pictures import regions
+    from polycorner.skeletons.search import traced
+
+    curves = [traced(found, edge) for edge in found.edges]
+    shown: Any = np.vstack([*curves, *(np.atleast_2d(point) for _, point in points)])
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    margin = 0.06 * (high - low).max()
+    crowded = len(found.corners) > CROWDED
+    corners = [
+        ("" if crowded else label(k), corner.point) for k, corner in enumerate(found.corners)
+    ]
+    window = (low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin)
+    return regions.draw_region(polyhedron, window, corners=corners, edges=curves, minima=points)

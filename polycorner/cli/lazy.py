@@ -5,9 +5,10 @@ An application registers its commands as entry points of the group ``polycorner.
 beside their files, are entry points of ``polycorner.studies`` (:mod:`polycorner.cli.sweep`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import import_module
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
@@ -41,6 +42,8 @@ class LazyGroup(click.Group):
         Module and attribute of each command, imported when it runs or its help is shown.
     prefix : str, optional
         What precedes the names of this group's members among the entry points.
+    of_files : mapping from str to str, optional
+        What takes the place of commands where an argument is a problem in a file, ``FILE.toml``.
     """
 
     command_class = GroupedCommand
@@ -50,10 +53,12 @@ class LazyGroup(click.Group):
         *args: Any,
         members: Mapping[str, str] | None = None,
         prefix: str = "",
+        of_files: Mapping[str, str] | None = None,
         **options: Any,
     ) -> None:
         super().__init__(*args, **options)
         self.members, self.prefix = dict(members or {}), prefix
+        self.of_files = dict(of_files or {})
 
     def add_command(self, cmd: click.Command, name: str | None = None) -> None:
         """Add a command, together with the options that all commands share."""
@@ -69,8 +74,7 @@ class LazyGroup(click.Group):
         """Return a command, importing it if necessary."""
         if cmd_name not in self.commands:
             if cmd_name in self.members:
-                module, _, attribute = self.members[cmd_name].partition(":")
-                self.add_command(getattr(import_module(module), attribute), cmd_name)
+                self.add_command(_imported(self.members[cmd_name]), cmd_name)
             elif self.prefix + cmd_name in registered("commands"):
                 point = registered("commands")[self.prefix + cmd_name]
                 self.add_command(_loaded(point), cmd_name)
@@ -80,6 +84,8 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that the arguments name, and the arguments that are left."""
+        if args[0] in self.of_files and _name_a_problem(args[1:]):
+            return args[0], everywhere(_imported(self.of_files[args[0]])), args[1:]
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
@@ -87,6 +93,18 @@ class LazyGroup(click.Group):
                 raise
             msg = f"{error.message.rstrip('.')}; {UNREGISTERED}"
             raise click.UsageError(msg, ctx) from error
+
+
+def _imported(place: str) -> click.Command:
+    module, _, attribute = place.partition(":")
+    command: click.Command = getattr(import_module(module), attribute)
+    return command
+
+
+def _name_a_problem(arguments: Sequence[str]) -> bool:
+    """Whether one of the arguments is a problem in a file, not options in one."""
+    pairs = pairwise(["", *arguments])
+    return any(a.endswith(".toml") and a[0] != "-" and before != "--config" for before, a in pairs)
 
 
 def _loaded(point: "EntryPoint") -> click.Command:

@@ -18,20 +18,28 @@ VARIABLE = "_POLYCORNER_COMPLETE"  # by which shells ask for completions
 UNEXPECTED, NO_OUTPUT, INTERRUPTED, BROKEN_PIPE = 70, 74, 130, 141
 EXIT_CODES = {
     0: "success, whatever the answer",
-    1: "a check of polycorner paper failed to run",
+    1: "a file was not verified, or a check of polycorner paper failed to run",
     2: "bad input, or a file that cannot be read or written",
     UNEXPECTED: "unexpected error: a defect of the program",
     NO_OUTPUT: "standard output cannot be written",
     INTERRUPTED: "interrupted; the message says whether results were kept",
     BROKEN_PIPE: "broken pipe",
 }
-COMMANDS = {name: f"polycorner.cli.{name}:{name}" for name in ("atlas", "cache", "minima", "sweep")}
+NAMES = ("atlas", "cache", "minima", "sweep", "verify")
+COMMANDS = {name: f"polycorner.cli.{name}:{name}" for name in NAMES}
+OF_FILES = {n: f"polycorner.cli.problems:{n}" for n in ("atlas", "minima", "prove", "view")}
 EXAMPLES = examples(
-    "dyad", "dyad --rod 1 --drum inf --json", "atlas spheres --count 6", "dyad --help"
+    "dyad",
+    "dyad --rod 1 --drum inf --json",
+    "atlas spheres --count 6",
+    "dyad --help",
 )
 UNITS = """
 Lengths are in mm, times in s.  Angles on the command line and in tables are in degrees; in JSON the
 keys of angles in degrees end in _deg, all other angles are in radians.
+
+The commands prove, atlas, minima and view also take a problem of your own in a file: FILE.toml, and
+--help after it.
 
 \b
 Exit codes:
@@ -42,6 +50,7 @@ EPILOG = EXAMPLES + UNITS + "\n".join(f"  {code:<3}  {words}" for code, words in
 @click.group(
     cls=LazyGroup,
     members=COMMANDS,
+    of_files=OF_FILES,
     context_settings={
         "help_option_names": ["-h", "--help"],
         "show_default": True,

@@ -62,10 +62,10 @@ class Indexed:
     def whole(self, node: ast.expr, indices: Indices) -> int:
         """Return the whole number that an index or the end of a range is."""
         self._count()
-        found = None
+        found: int | None = None
         match node:
-            case ast.Constant(value=int(found)) if not isinstance(found, bool):
-                pass
+            case ast.Constant(value=int(number)) if not isinstance(number, bool):
+                found = number
             case ast.Name(id=name) if name in indices or name in self.numbers:
                 found = indices[name] if name in indices else self.numbers[name]
             case ast.UnaryOp(op=ast.USub(), operand=operand):
@@ -138,6 +138,9 @@ def _with(node: ast.expr, field: str, value: object) -> ast.expr:
     return type(node)(**fields)
 
 
+RELATIONS: dict[type, str] = {ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}
+
+
 def comparisons(tree: ast.expr, allowed: tuple[type, ...]) -> list[ast.expr]:
     """Return the sides' differences of ``a <= b <= c``, which are at least zero, or a formula."""
     if not isinstance(tree, ast.Compare):
@@ -145,9 +148,7 @@ def comparisons(tree: ast.expr, allowed: tuple[type, ...]) -> list[ast.expr]:
     found: list[ast.expr] = []
     for op, (a, b) in zip(tree.ops, pairwise([tree.left, *tree.comparators]), strict=True):
         if not isinstance(op, allowed):
-            _refuse(
-                " or ".join({ast.LtE: "<=", ast.GtE: ">=", ast.Eq: "=="}[k] for k in allowed), tree
-            )
+            _refuse(" or ".join(RELATIONS[kind] for kind in allowed), tree)
         high, low = (a, b) if isinstance(op, ast.GtE) else (b, a)
         zero = isinstance(low, ast.Constant) and low.value == 0
         found.append(high if zero else ast.BinOp(high, ast.Sub(), low))

@@ -2,6 +2,7 @@
 
 import ast
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -26,6 +27,8 @@ KEYS = (
     "points",
 )  # fmt: skip
 COORDINATE = ("names", "sphere", "rotation", "period", "scale", "unit", "box")
+
+_POINT = re.compile(r"\w[\w-]{0,99}")
 
 
 class Reader:
@@ -262,6 +265,8 @@ class Reader:
         """Yield the numbers of every point as they are written."""
         for name, written in self._of("points", dict, {}).items():
             place, entry = f"points.{name}", written
+            if not _POINT.fullmatch(name):
+                refuse("points", "names of letters, digits, _ and -, which name files, too", name)
             if isinstance(written, dict) and set(written) == set(self.manifold.names):
                 entry = [written[coordinate] for coordinate in self.manifold.names]
             row = (

@@ -7,14 +7,27 @@ from click.types import FloatParamType, IntParamType
 
 from polycorner.cli.main import cli
 
-NEEDED = {"completion": ("bash",), "sweep": ("heading",), "view trajectory": ("nowhere.nc",)}
+NEEDED = {
+    "completion": ("bash",),
+    "sweep": ("heading",),
+    "verify": ("no.zip",),
+    "view trajectory": ("nowhere.nc",),
+}
 # Nothing that is no number is a number; the paper's models have no use for infinities.
 WRONG = {
     FloatParamType: ("x", "", "nan", "-inf"),
     IntParamType: ("x", "", "1.5", "-7", "99999999999999999999"),
     click.Choice: ("?", ""),
 }
-UNBOUNDED = {"--seed", "--budget", "--starts", "--workers", "--count"}  # above
+UNBOUNDED = {
+    "--seed",
+    "--budget",
+    "--starts",
+    "--workers",
+    "--count",
+    "--sample",
+    "--jobs",
+}  # above
 
 
 def leaves(command, *names):
@@ -75,7 +88,7 @@ def test_a_wrong_path_is_one_sentence(capsys, monkeypatch, tmp_path, name, comma
 
 @pytest.mark.parametrize("name", [name for name, _ in leaves(cli)])
 def test_an_argument_too_many_is_one_sentence(capsys, name):
-    if name == "paper":  # which takes any number of ids
+    if name in ("paper", "verify"):  # which take any number
         return
     code, out, err = commands.run(capsys, *name.split(), *NEEDED.get(name, ()), "superfluous")
     assert (code, out, err.count("\n")) == (2, "", 1)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, SmoothFunction
+from polycorner.bodies import Arrangement, box, polygon
 from polycorner.files import load_problem, save_problem
 from polycorner.models import Pinball, SphereCluster, Tutorial
 
@@ -137,6 +138,16 @@ def test_a_table_of_coordinates(written, tmp_path, table, options, expected):
 def test_what_the_library_writes_it_reads(tmp_path, polyhedron):
     read = load_problem(save_problem(tmp_path / "a.toml", polyhedron)).polyhedron
     same(read, polyhedron)
+
+
+def test_bodies_come_back_with_their_unions(tmp_path):
+    square = polygon([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    squares = Arrangement([square] * 2, box([0, 0], [2.3, 2.3]), orientations="none").polyhedron
+    assert squares.is_union
+    read = load_problem(save_problem(tmp_path / "a.toml", squares)).polyhedron
+    q = np.random.default_rng(0).uniform(0, 2.3, (200, 4))
+    np.testing.assert_allclose(read.values(q), squares.values(q), atol=1e-14)
+    same(read, squares)
 
 
 def test_an_energy_and_points_come_back(tmp_path):
@@ -313,6 +324,7 @@ MISTAKES = {
     "huge point": (SMALL + 'points.p = [1, "1e9999"]', "points.p"),
     "huge decimal": (SMALL + "points.p = [1, 1e999999999]", "points.p"),
     "zero": (SMALL + 'points.p = [1, "1/0"]', "points.p"),
+    "point's name": (SMALL + 'points."../p" = [1, 2]', "points: expected names"),
     "outside": (SMALL + 'points.p = { file = "../secret" }', "in the folder"),
     "absolute": (SMALL + 'points.p = { file = "/etc/passwd" }', "in the folder"),
     "columns": (SMALL + 'points.p = { file = "good.csv", columns = [0] }', "columns"),

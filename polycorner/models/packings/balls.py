@@ -107,10 +107,11 @@ class Balls(Checked):
         return terms[0] if self.equal else SmoothFunction.sum("minus sum of radii", terms)
 
     @checked
-    def starts(self, rng: np.random.Generator, count: int) -> Array:
+    def starts(self, rng: "np.random.Generator | int | None", count: int) -> Array:
         """Return ``count`` points with uniform centres and the best radii."""
+        rng = checks.generator("rng", rng)
         several = range(checks.whole("count", count, least=1))
-        return np.array([self.best(self.area.scattered(rng, self.count)) for _ in several])
+        return np.array([self._best(self.area.scattered(rng, self.count)) for _ in several])
 
     def centres(self, q: ArrayLike) -> Array:
         """Return the centres of one point, ``(n, d)``, on a torus as points of the plane."""
@@ -153,9 +154,9 @@ class Balls(Checked):
         if frame.shape not in {(), (d,)} or not np.isfinite(frame).all():
             checks.refuse("origin", f"a finite number or {d} of them", origin)
         plane = (given - frame) / checks.real("unit", unit, above=0)
-        return self.best(self.area.placed(self.area.coordinates(plane)))
+        return self._best(self.area.placed(self.area.coordinates(plane)))
 
-    def best(self, centres: Array) -> Array:
+    def _best(self, centres: Array) -> Array:
         """Return the point of centres in coordinates of the region, ``(n, d)``, with best radii."""
         room = np.maximum(self.area.room(centres), 0.0)
         i, j = np.triu_indices(self.count, 1)
@@ -166,16 +167,17 @@ class Balls(Checked):
             radii = _largest_sum(room, i, j, apart)
         return np.concatenate([centres.ravel(), radii])
 
-    def repaired(self, q: Array) -> Array:
+    def repaired(self, q: ArrayLike) -> Array:
         """Return a point of the polyhedron near ``q``: the same centres with the best radii."""
-        return self.best(self.area.placed(self._parts(q)[0]))
+        return self._best(self.area.placed(self._parts(q)[0]))
 
-    def moved(self, q: Array, rng: np.random.Generator) -> Array:
+    def moved(self, q: ArrayLike, rng: "np.random.Generator | int | None" = None) -> Array:
         """Return ``q`` with all centres shaken, some of them, or a few bodies put into holes.
 
         The smallest bodies, and those that touch none, are often put elsewhere.
         """
         centres, radii = self._parts(q)
+        rng = checks.generator("rng", rng)
         length = float(self.manifold.scales[0])
         kind = rng.integers(3)
         if kind == 0:

@@ -121,8 +121,9 @@ class PointsOnSphere(Checked):
         return Symmetry(fields=fields)
 
     @checked
-    def starts(self, rng: np.random.Generator, count: int) -> Array:
+    def starts(self, rng: "np.random.Generator | int | None", count: int) -> Array:
         """Return ``count`` points with uniform vectors."""
+        rng = checks.generator("rng", rng)
         several = checks.whole("count", count, least=1)
         vectors = rng.standard_normal((several, self.count, 3))
         return np.array([self.point(part) for part in vectors])
@@ -147,13 +148,13 @@ class PointsOnSphere(Checked):
         """Return the unit vectors of one point, ``(n, 3)``."""
         return self.manifold.point(q)[: 3 * self.count].reshape(-1, 3)
 
-    def repaired(self, q: Array) -> Array:
+    def repaired(self, q: ArrayLike) -> Array:
         """Return the same vectors with their largest cosine."""
         return self.point(self.vectors(q))
 
-    def moved(self, q: Array, rng: np.random.Generator) -> Array:
+    def moved(self, q: ArrayLike, rng: "np.random.Generator | int | None" = None) -> Array:
         """Return ``q`` with all vectors shaken, or one put elsewhere."""
-        vectors = self.vectors(q).copy()
+        vectors, rng = self.vectors(q).copy(), checks.generator("rng", rng)
         if rng.random() < 0.5:
             vectors[rng.integers(self.count)] = rng.standard_normal(3)
         width = self._apart * rng.choice(SHAKES)

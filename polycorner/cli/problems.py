@@ -1,0 +1,360 @@
+"""Commands on a problem in a file: ``polycorner prove FILE.toml``, and so on."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from polycorner.cli.atlas import planar, skeletal
+from polycorner.cli.minima import WORDS, report_minima, start_options
+from polycorner.cli.options import command, examples, option, output_options, seed_option
+from polycorner.cli.output import (
+    deliver,
+    fail,
+    prepare,
+    remark,
+    shown,
+    working,
+    write_answer,
+    writing,
+)
+from polycorner.cli.search import Begin, search_options
+
+if TYPE_CHECKING:
+    from polycorner.files import ProblemFile
+    from polycorner.minimisation import Certificate
+    from polycorner.printing import Sheet
+    from polycorner.proofs import Proof
+
+STARTS = 60  # random points from which a search for corners descends, beside those of the file
+MOST_DIGITS = 10_000
+FILE = "examples/circles_in_square.toml"
+
+
+def with_problem(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the argument FILE, and pass the problem in it."""
+    return click.argument("file", metavar="FILE", type=click.Path(path_type=Path))(function)
+
+
+def read(file: Path) -> "ProblemFile":
+    """Return a problem, or end the command with what is wrong in its file."""
+    from polycorner.files import load_problem
+
+    try:
+        return load_problem(file)
+    except ValueError as error:
+        fail(str(error))
+    except OSError as error:
+        fail(f"{error.filename or file} cannot be read ({error.strerror or error})")
+
+
+# ------------------------------------------------------------------------------------------- prove
+
+
+@command(epilog=examples(f"prove {FILE}", f"prove {FILE} --point quincunx --digits 100 --out out"))
+@with_problem
+@option(
+    "--point",
+    "chosen",
+    multiple=True,
+    metavar="NAME",
+    group="Proof",
+    help="Points of the file; repeat for several. [all]",
+)
+@option(
+    "--digits",
+    type=click.IntRange(1, MOST_DIGITS),
+    default=30,
+    group="Proof",
+    help="Significant digits.",
+)
+@option(
+    "--box",
+    "boxes",
+    multiple=True,
+    metavar="NAME=LOW:HIGH",
+    group="Proof",
+    help="Prove it for all values of a parameter in an interval; repeat for several.",
+)
+@option("--minimise", is_flag=True, group="Proof", help="Descend from the points first.")
+@output_options
+def prove(
+    file: Path, chosen: tuple[str, ...], digits: int, boxes: tuple[str, ...], minimise: bool,
+    as_json: bool, out: Path | None,
+) -> None:  # fmt: skip
+    """Prove that there are local minima at the points of FILE, and enclose them.
+
+    First it is said whether the coordinates as they are written lie in the set.
+    """
+    problem = read(file)
+    if problem.energy is None:
+        fail(f"{file}: energy: expected minimise or maximise; got none")
+    names = _chosen(problem, chosen, file)
+    sides = dict(_interval(problem, written) for written in boxes)
+    prepare(out)
+    rows, sheets, written = [], [], []
+    for name in names:
+        with working(f"proving {name}") as progress:
+            given, proof = _judged(problem, name, digits, sides, minimise, progress)
+        rows.append({"point": name, "given": given, **_answer(problem, proof)})
+        sheets.append(_sheet(name, given, problem, proof))
+        if out is not None and proof.proved and hasattr(proof, "save"):
+            written += _saved(proof, out / f"{name}.zip", rows[-1])
+    answer = {"problem": str(file), "title": problem.title, "proofs": rows}
+
+    def write() -> list[Path]:
+        return [] if out is None else [*written, write_answer(answer, out, "proofs.json")]
+
+    deliver(answer, lambda: "\n\n".join(map(shown, sheets)), write, as_json=as_json)
+
+
+def membership(problem: "ProblemFile", name: str) -> dict[str, Any]:
+    """Return whether the coordinates of a point, as the file writes them, lie in the set.
+
+    ``inside`` is null where that is not decided; ``violated`` has values, as texts, by name.
+    """
+    import polycorner
+
+    exact_point = getattr(polycorner, "exact_point", None)
+    if exact_point is not None:
+        found = exact_point(problem.polyhedron, problem.exact[name], problem.energy)
+        violated = {v.name: list(v.value) for v in found.violations}
+        energy = None if found.energy is None else list(found.energy)
+        return {"inside": found.inside, "violated": violated, "near": energy}
+    d, q = problem.polyhedron, problem.points[name]
+    values = [*zip(d.names, d.values(q).tolist(), strict=True)]
+    off = zip(d.equation_names, d.equation_values(q).tolist(), strict=True)
+    violated = {n: [repr(x)] for n, x in values if x < 0} | {n: [repr(x)] for n, x in off if x}
+    return {"inside": None, "violated": violated, "near": None}
+
+
+def _chosen(problem: "ProblemFile", chosen: Sequence[str], file: Path) -> list[str]:
+    from polycorner.errors import nearest
+
+    if not problem.points:
+        fail(f"{file}: points: expected at least one; polycorner minima {file} searches for some")
+    for name in chosen:
+        if name not in problem.points:
+            known = ", ".join(problem.points)
+            fail(f"--point: expected one of {known}; got {nearest(name, problem.points)}")
+    return list(dict.fromkeys(chosen or problem.points))
+
+
+def _interval(problem: "ProblemFile", written: str) -> tuple[str, tuple[float, float]]:
+    name, _, sides = written.partition("=")
+    low, _, high = sides.partition(":")
+    functions = [*problem.polyhedron.functions, *problem.polyhedron.stated, problem.energy]
+    known = {p for f in functions if f is not None for p in f.family.parameters}
+    if name not in known:
+        words = ", ".join(sorted(known)) or "none: parameters that vary are decimals in the file"
+        fail(f"--box: expected NAME=LOW:HIGH with one of the parameters {words}; got {written!r}")
+    try:
+        return name, (float(low), float(high))
+    except ValueError:
+        fail(f"--box: expected two numbers, as in {name}=0.9:1.1; got {written!r}")
+
+
+def _judged(
+    problem: "ProblemFile", name: str, digits: int, sides: dict[str, Any], minimise: bool,
+    progress: Any,
+) -> "tuple[dict[str, Any], Proof]":  # fmt: skip
+    """Return what is said of the coordinates as written, and of the point near them."""
+    import polycorner as pc
+
+    assert problem.energy is not None
+    find: Callable[..., Certificate] = pc.minimise if minimise else pc.certify
+    try:
+        given = membership(problem, name)
+        found = find(problem.polyhedron, problem.energy, problem.points[name])
+        return given, pc.prove(found, digits=digits, parameters=sides or None, progress=progress)
+    except ValueError as error:
+        fail(f"point {name}: {error}")
+
+
+def _answer(problem: "ProblemFile", proof: "Proof") -> dict[str, Any]:
+    energy = proof.enclosures.get("energy")
+    answer: dict[str, Any] = {
+        "verdict": proof.certificate.verdict.value,
+        "proved": proof.proved,
+        "statement": proof.statement,
+        "conditions": {name: str(status) for name, status in proof.conditions.items()},
+        "reasons": dict(proof.reasons),
+        "active": list(proof.active),
+        "modulo": list(proof.symmetry),
+        "digits": proof.digits,
+        "enclosures": {name: list(sides) for name, sides in proof.enclosures.items()},
+        "rattlers": {name: list(proof.enclosures[name]) for name in _rattling(proof)},
+        "alone": {name: list(sides) for name, sides in proof.box.items()},
+    }
+    if problem.maximised and energy is not None:  # the bounds of the negative, exchanged
+        answer["maximum"] = [_negative(energy[1]), _negative(energy[0])]
+    if proof.parameters:
+        answer["box"] = {name: list(sides) for name, sides in proof.parameters.items()}
+        answer["proved_fraction"] = proof.proved_fraction
+        answer["cells"] = len(proof.cells)
+    return answer
+
+
+def _negative(decimals: str) -> str:
+    return decimals.removeprefix("-") if decimals.startswith("-") else f"-{decimals}"
+
+
+def _rattling(proof: "Proof") -> list[str]:
+    if proof.minimum is None:
+        return []
+    names = proof.certificate.problem.polyhedron.manifold.names
+    return [names[j] for j in proof.minimum.rattling]
+
+
+def _sheet(name: str, given: dict[str, Any], problem: "ProblemFile", proof: "Proof") -> "Sheet":
+    from polycorner.printing import Sheet, Table
+
+    words = {
+        True: "the coordinates as written lie in the set",
+        False: "the coordinates as written lie outside the set",
+        None: "whether the coordinates as written lie in the set is not decided",
+    }[given["inside"]]
+    parts: list[Any] = [f"{words}."]
+    rows = tuple((n, value[0], value[-1]) for n, value in given["violated"].items())
+    if rows:
+        parts.append(Table(("violated as written", "from", "to"), rows, (1, 2)))
+    answer = _answer(problem, proof)
+    if "maximum" in answer:
+        parts.append("The energy is the negative of what is maximised, which lies between "
+                     f"{answer['maximum'][0]} and {answer['maximum'][1]}.")  # fmt: skip
+    room = tuple((n, low, high) for n, (low, high) in answer["rattlers"].items())
+    if room:
+        parts.append(Table(("free to move", "from", "to"), room, (1, 2)))
+    return Sheet(name, (*parts, *proof.sheet.parts))
+
+
+def _saved(proof: "Proof", path: Path, row: dict[str, Any]) -> list[Path]:
+    """Save a proof for the checker, or note why there is no file of it."""
+    with writing(path):
+        try:
+            saved = [Path(proof.save(path))]  # type: ignore[attr-defined]
+        except ValueError as error:
+            row["not_saved"] = str(error)
+            remark(f"{path.name} is not written: {error}")
+            return []
+    row["file"] = str(path)
+    return saved
+
+
+# ----------------------------------------------------------------------------------- atlas, minima
+
+
+@command(epilog=examples(f"atlas {FILE} --budget 100", "atlas region.toml --out out"))
+@with_problem
+@search_options
+def atlas(file: Path, begin: Begin) -> None:
+    """List corners, edges and faces of the set in FILE.
+
+    The search descends from the points of the file and from random ones.
+    """
+    problem = read(file)
+    search = begin(file.stem, {"file": str(file.resolve())})
+
+    def starts(rng: Any) -> Any:
+        return _starts(problem, rng, STARTS)
+
+    d = problem.polyhedron
+    (planar if _flat(problem) else skeletal)(search, d, starts)
+
+
+@command(epilog=examples(f"minima {FILE} --starts 100"))
+@with_problem
+@start_options
+def minima(file: Path, starts: int, seed: int, as_json: bool, out: Path | None) -> None:
+    """Find the local minima of the problem in FILE, from its points and random ones."""
+    problem = read(file)
+    if problem.energy is None:
+        fail(f"{file}: energy: expected minimise or maximise; got none")
+    prepare(out)
+    with working(WORDS, "starts") as progress:
+        import numpy as np
+
+        from polycorner.minimisation import minima as search
+
+        points = _starts(problem, np.random.default_rng(seed), starts)
+        try:
+            found = search(problem.polyhedron, problem.energy, starts=points, progress=progress)
+        except ValueError as error:
+            fail(f"{file}: {error}")
+    numbers = {id(c): str(k) for k, c in enumerate(found)}
+
+    def described(certificate: "Certificate") -> dict[str, Any]:
+        return {"name": numbers[id(certificate)]}
+
+    unit = problem.energy.unit
+    report_minima(file.stem, {"file": str(file)}, found, described, unit, as_json=as_json, out=out)
+
+
+def _starts(problem: "ProblemFile", rng: Any, count: int) -> Any:
+    """Return the points of a file and random ones, ``(k, n)``, in its box.
+
+    Where a line has none, they lie about the points of the file, within two units of its scale.
+    """
+    import numpy as np
+
+    manifold = problem.polyhedron.manifold
+    given = np.array([*problem.points.values()]).reshape(-1, manifold.size)
+    centres = given if len(given) else np.zeros((1, manifold.size))
+    more = max(count - len(given), 0)
+    found = np.empty((more, manifold.size))
+    for i, (side, period) in enumerate(zip(problem.box, manifold.periods, strict=True)):
+        reach = 2 * manifold.scales[i]
+        low, high = centres[:, i].min() - reach, centres[:, i].max() + reach
+        if np.isfinite(period):
+            low, high = 0.0, period
+        found[:, i] = rng.uniform(*(side or (low, high)), more)
+    if manifold.factors:
+        found = manifold.factors.scattered(found, rng)
+    return manifold.onto(np.vstack([given, found]))
+
+
+def _flat(problem: "ProblemFile") -> bool:
+    """Whether the set is a region of a plane."""
+    d = problem.polyhedron
+    return d.manifold.size == 2 and not d.equations and not d.manifold.circles
+
+
+# -------------------------------------------------------------------------------------------- view
+
+
+@command(epilog=examples("view region.toml --out region.png"))
+@with_problem
+@option(
+    "--out",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    group="Output",
+    help="Write the picture into this file, and open nothing.",
+)
+@seed_option("the random points")
+def view(file: Path, out: Path | None, seed: int) -> None:
+    """Show the region of the plane in FILE, with its corners and points.
+
+    For other sets, see polycorner atlas.
+    """
+    problem = read(file)
+    if not _flat(problem):
+        fail(f"{file}: expected two coordinates on lines and no equations; polycorner atlas {file}"
+             " lists corners, edges and faces")  # fmt: skip
+    with working("drawing"):
+        import numpy as np
+
+        from polycorner import skeleton
+        from polycorner.cli.atlas import region_picture
+        from polycorner.pictures import save
+
+        rng = np.random.default_rng(seed)
+        found = skeleton(problem.polyhedron, _starts(problem, rng, STARTS), rng=rng)
+        figure = region_picture(problem.polyhedron, found, [*problem.points.items()])
+        path = out or Path(file.stem).with_suffix(".png")
+        with writing(path):
+            save(figure, path)
+    click.echo(f"wrote {path}")
+    if out is None:
+        click.launch(str(path))
