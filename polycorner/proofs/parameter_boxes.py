@@ -121,9 +121,9 @@ def cover(
     while waiting:
         _, _, item = heappop(waiting)
         with precision(CELL_BITS):
-            cell, halves = _tried(claim, names, item, sides)
-        if halves and len(done) + len(waiting) + 2 <= max_cells:
-            for half in halves:
+            cell, parts = _tried(claim, names, item, sides)
+        if parts and len(done) + len(waiting) + 2 <= max_cells:
+            for half in parts:
                 volume = prod(upper - lower for lower, upper in half.sides)
                 heappush(waiting, (-volume / whole, next(order), half))
             continue
@@ -143,7 +143,7 @@ def _tried(
     if isinstance(centre, Undecided):
         found = without_enclosure(centre, symmetric=bool(claim.fields))
         cell = _cell(sides, found, {})
-        return cell, [_Waiting(half, item.start, item.at) for half in _halves(item.sides, whole)]
+        return cell, [_Waiting(half, item.start, item.at) for half in halves(item.sides, whole)]
     p0 = [ball(x) for x in middle]
     reach = [between(*side) - p for side, p in zip(item.sides, p0, strict=True)]
     enclosure = enclose(claim.system, centre, Cell(p0, reach), bits=CELL_BITS)
@@ -158,7 +158,7 @@ def _tried(
         cell = _cell(sides, kept, _bounds(claim, enclosure))
     if cell.status is not Status.UNDECIDED:
         return cell, []
-    return cell, [_Waiting(half, centre, middle) for half in _halves(item.sides, whole)]
+    return cell, [_Waiting(half, centre, middle) for half in halves(item.sides, whole)]
 
 
 def _cell(
@@ -216,7 +216,7 @@ def _outwards(value: "Ball") -> Interval:
     return nextafter(float(lower), float("-inf")), nextafter(float(upper), float("inf"))
 
 
-def _halves(
+def halves(
     sides: tuple[Interval, ...], whole: Mapping[str, Interval]
 ) -> Iterator[tuple[Interval, ...]]:
     """Return the halves across the side that is longest relative to the whole box, if any."""

@@ -51,12 +51,15 @@ from polycorner.printing import Printed, Sheet, Table, facts, titled, units
 from polycorner.progress import Progress, silent
 from polycorner.proofs.attempt import Attempt, Posed, attempt, bits_for, pose_claim
 from polycorner.proofs.bounded import SUBJECT, BoundedMinimum
-from polycorner.proofs.bounded_search import bounded_minimum
+from polycorner.proofs.bounded_search import SIMPLE, bounded_minimum
+from polycorner.proofs.files import Face, UncheckedError, save_cells, save_face, save_minimum
+from polycorner.proofs.growth import Gauge
 from polycorner.proofs.hypotheses import SYMMETRIC, ConditionResult, Status
 from polycorner.proofs.invariance import Generator, generators
 from polycorner.proofs.kkt import FIRST_BITS, Enclosure, widened
 from polycorner.proofs.parameter_boxes import (
     CELL_BITS,
+    CHECK_BITS,
     Interval,
     ParameterCell,
     check_domain,
@@ -71,6 +74,9 @@ from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.values import Checked
 
 if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
     import sympy
 
 DOUBLE_DIGITS = 17  # of a floating-point number, which bounds over a box of parameters are
@@ -132,6 +138,8 @@ class Proof(Checked, Printed):
         floating-point coordinates are, and equations that do not vanish there, with their values;
         empty where it lies in the set.  What is proved concerns a point beside it;
         :func:`~polycorner.proofs.exact_point` repairs such points.
+    face : Face or None
+        What the first statement is saved with.
     """
 
     certificate: Certificate
@@ -148,6 +156,7 @@ class Proof(Checked, Printed):
     minimum: BoundedMinimum | None = field(default=None, repr=False)
     room: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     outside: Mapping[str, str] = field(default_factory=dict, repr=False)
+    face: Face | None = field(default=None, repr=False)
 
     @property
     def statement(self) -> str:
@@ -243,6 +252,50 @@ class Proof(Checked, Printed):
                 found += bounds(value)
         digits = min(self.digits, DOUBLE_DIGITS) if self.cells else self.digits
         return decimals(min(found), max(found), digits)
+
+    def save(self, path: "str | os.PathLike[str]") -> "Path":
+        """Save what is proved, with its evidence, for an independent checker; return the path.
+
+        The checker is run first.  It does less algebra than :func:`prove`: where it does not follow
+        the proof of a strict minimum, one of a minimum between two energies is sought.
+
+        See :mod:`polycorner.proofs.files` and :mod:`polycorner.proofs.checker`.
+
+        Raises
+        ------
+        ValueError
+            If a condition is not proved, if the checker follows neither proof, or if the name does
+            not end in ``.zip``.
+        OSError
+            If the file could not be written.
+        """
+        if not self.proved:
+            checks.refuse("save", "a proof of which all conditions are proved", self)
+        problem, bits = self.certificate.problem, bits_for(self.digits)
+        with precision(bits):
+            manifold, free = problem.polyhedron.manifold, tuple(self.parameters)
+            formulas = Formulas(problem.functions, manifold, free)
+            try:
+                if self.minimum is not None:
+                    return save_minimum(path, problem, formulas, self.minimum.witness, bits)
+                assert self.face is not None
+                if free:
+                    some = self.face, self.parameters, self.cells
+                    return save_cells(path, problem, formulas, *some, CHECK_BITS)
+                return save_face(path, problem, formulas, self.face, bits)
+            except UncheckedError as error:
+                found = None if free else self._between(formulas)
+                if found is None:
+                    msg = f"save: expected a proof that the checker follows; it says: {error}"
+                    raise ValueError(msg) from None
+                return save_minimum(path, problem, formulas, found.witness, bits)
+
+    def _between(self, formulas: Formulas) -> BoundedMinimum | None:
+        """Return a minimum between two energies at the same point, if one is found."""
+        c = self.certificate
+        fields = [gauge.field for gauge in (self.face.gauges if self.face else ())]
+        found = bounded_minimum(c.problem, formulas, c.point, fields, c.tolerances, self.digits)
+        return None if self.minimum or isinstance(found, Undecided) else found
 
     def __repr__(self) -> str:
         """Return whether it is proved, and the status of every condition if not."""
@@ -480,7 +533,19 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
             name: decimals(*side, digits + BOX_DIGITS, inwards=True) for name, side in box.items()
         },
         region=tuple(values[: d.manifold.size]),
+        face=_face(posed, values[: d.manifold.size]),
     )
+
+
+def _face(posed: Posed, sides: Sequence[Bounds]) -> Face:
+    """Return a face and its point: the simplest numbers, where they may be the coordinates."""
+    system = posed.claim.system
+    middle = [(lower + upper) / 2 for lower, upper in sides]
+    simple = [x.limit_denominator(SIMPLE) for x in middle]
+    exactly = all(a <= x <= b for x, (a, b) in zip(simple, sides, strict=True))
+    normals = ([Fraction(x) for x in gauge] for gauge in system.gauges)
+    gauges = [Gauge(f, tuple(n)) for f, n in zip(posed.claim.fields, normals, strict=True)]
+    return Face(system.held, tuple(simple if exactly else middle), tuple(gauges))
 
 
 def _bounded(
@@ -578,4 +643,5 @@ def _many(
         },
         parameters=sides,
         cells=cells,
+        face=None if isinstance(posed, Undecided) else _face(posed, ()),
     )

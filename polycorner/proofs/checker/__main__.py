@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from .balls import NotShownError
 from .verdict import check
 
+MOST_LETTERS = 1000  # of a refusal, which quotes the file
+
 
 def positive(text: str) -> int:
     value = int(text)
@@ -19,9 +21,9 @@ positive.__name__ = "positive whole number"  # argparse names the type in its me
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    about = "Check a saved list of stationary points and its proof."
+    about = "Check a saved proof: of a minimum, or of a list of stationary points."
     parser = argparse.ArgumentParser(prog="checker", description=about)
-    parser.add_argument("file", help="a file written by StationaryList.save")
+    parser.add_argument("file", help="a file written by Proof.save or StationaryList.save")
     parser.add_argument(
         "--sample", type=positive, metavar="K", help="check K leaves drawn at random, not all"
     )
@@ -32,15 +34,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         print(check(given.file, given.sample, given.jobs))
     except NotShownError as error:
-        print(f"NOT VERIFIED: {error}")
-        return 1
+        why = str(error)
     except OSError as error:
-        print(f"NOT VERIFIED: the file cannot be read: {error}")
-        return 1
+        why = f"the file cannot be read: {error}"
     except Exception as error:  # whatever goes wrong, nothing is verified
-        print(f"NOT VERIFIED: the file is malformed: {error!r}")
-        return 1
-    return 0
+        why = f"the file is malformed: {error!r}"
+    else:
+        return 0
+    line = " ".join(why.split())
+    print(f"NOT VERIFIED: {line[:MOST_LETTERS]}{'...' if len(line) > MOST_LETTERS else ''}")
+    return 1
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Numbers, boxes and matrices as balls, and what cannot be shown."""
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -8,6 +9,8 @@ from flint import arb, arb_mat, fmpq
 
 BITS, STEPS = 128, 60
 BESIDE = 2.0**-40  # to which points beyond a side are listed: wider than enclosures in doubles
+MOST_LETTERS = 4000  # of a number
+NUMBER = re.compile(r"(-?[0-9]+)(?:/(0*[1-9][0-9]*))?(?: (pi|e))?|(pi|e)")
 ZERO, NAN = arb(0), arb("nan")
 
 
@@ -46,11 +49,12 @@ def square(x: arb) -> arb:
 
 def number(text: str) -> arb:
     """Return a ball for ``"3/2"``, ``"pi"``, ``"e"`` or ``"2 pi"``."""
-    *factors, last = text.split()
-    units = {"pi": arb.pi(), "e": arb.const_e()}
-    ratios = factors if last in units else [last]
-    ratio = arb(fmpq(*map(int, ratios[0].split("/")))) if ratios else arb(1)
-    return ratio * units.get(last, arb(1))
+    need(isinstance(text, str) and len(text) <= MOST_LETTERS, "a number is no text, or too long")
+    found = NUMBER.fullmatch(text)
+    need(found, f"the number {text}")
+    above, below, *units = found.groups() if found else ()
+    ratio = arb(fmpq(int(above or 1), int(below or 1)))
+    return ratio * (arb.pi() if "pi" in units else arb.const_e() if "e" in units else arb(1))
 
 
 def sides(record: dict[str, Any], names: Sequence[str], count: int) -> list[list[float]]:

@@ -5,6 +5,7 @@ from typing import Any
 
 from flint import arb, arb_mat
 
+from .algebra import Algebra, TooMuchError, total
 from .balls import ZERO, different, dot, hull, need, nothing, number
 from .problem import StoredProblem
 from .proof import StoredProof
@@ -19,13 +20,18 @@ class StoredCorners(StoredProof):
 
     kind = "corners"
 
+    def energies(self) -> list[arb]:
+        return []
+
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = StoredProblem(data)
         different(data["regions"], "a region is stated")
         self.regions = [StoredVertex(p, r) for r in data["regions"]]
         self.tested = sum(vertex.tested for vertex in self.regions)
-        self.related = [StoredRelation(p, r).rows for r in data["relations"]]
-        self.symmetries = symmetries(p, data)
+        relations = [StoredRelation(p, r) for r in data["relations"]]
+        self.related = [relation.rows for relation in relations]
+        self.unproved = len({r.rows for r in relations if not r.proved})
+        self.symmetries, self.periodic = symmetries(p, data)
 
     def shown(self, lo: list[float], hi: list[float], _: list[list[arb]]) -> bool:
         """Whether a box is closed rightly."""
@@ -76,10 +82,11 @@ class StoredCorners(StoredProof):
 
 
 class StoredRelation:
-    """A linear relation between inequalities and equations, tested at random points."""
+    """A linear relation between inequalities and equations, at random points or by algebra."""
 
     def __init__(self, p: StoredProblem, record: dict[str, Any]) -> None:
         name, weights = f"relation {record}", [number(text) for text in record["weights"]]
+        different(record["rows"], f"{name}: a function is stated")  # it would cancel itself
         self.rows = frozenset(record["rows"])
         fine = (
             self.rows
@@ -88,10 +95,24 @@ class StoredRelation:
         )
         need(fine and len(weights) == len(record["rows"]) + p.k, name)
         every, draw = [*record["rows"], *range(p.m, p.m + p.k)], random.Random(1)
+        self.proved = self.vanishes(Algebra(p), record["weights"], every)
         for _ in range(POINTS):
             q = [arb(draw.uniform(a, b)) for a, b in zip(p.lower, p.upper, strict=True)]
             values = [p.values(q)[p.outputs[row]] for row in every]
             need(nothing(dot(weights, values)), f"{name}: is none")
+
+    def vanishes(self, algebra: Algebra, weights: list[str], every: list[int]) -> bool:
+        """Whether algebra shows that the combination is 0."""
+        whole = dict[Any, Any]()
+        for text, row in zip(weights, every, strict=True):
+            value = algebra.value(algebra.p.outputs[row])
+            if value is None:
+                return False
+            try:
+                whole = total(whole, algebra.product(algebra.leaf("const", text), value))
+            except TooMuchError:
+                return False
+        return not whole
 
 
 class StoredBox:

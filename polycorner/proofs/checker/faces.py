@@ -7,6 +7,8 @@ from flint import acb_mat, arb, arb_mat
 from .balls import BESIDE, ZERO, definite, dot, hull, moved, need, nothing, shown, sides, turn, zero
 from .problem import StoredProblem
 
+MOST_UNKNOWNS = 600  # of a point, with its multipliers
+MOST_ENTRIES = 10**7  # of the second derivatives by the coordinates of a point
 HALVINGS = 6  # of a region, in whose parts multipliers are enclosed
 
 
@@ -26,6 +28,7 @@ class StoredRegion:
         fine = self.active <= set(range(p.m)) and set(places) <= set(p.free)
         need(fine and len({*places}) == len(places), self.name)
         self.rows = [*sorted(self.active), *range(p.m, p.m + p.k + 1)]
+        self.limit()
         count = p.n if active is not None else len(places)
         self.lower, self.upper = sides(record, ("lower", "upper"), count)
         if active is not None:
@@ -42,8 +45,17 @@ class StoredRegion:
         self.placed(sharp, record, self.negative(), self.active)
         if active is None:
             self.descends()
-            self.met = record["sample"] is not None
-            need(not self.met or self.meets(record), f"{self.name}: the sample is not in the set")
+            need(self.index is not None, f"{self.name}: the index is not decided")
+            sample = record["sample"]
+            fine = sample is None or self.meets(record)
+            need(fine, f"{self.name}: the sample is not in the set")
+            self.met = sample is not None and not self.far
+
+    def limit(self) -> None:
+        """Refuse what would take too much work and memory."""
+        size, more = len(self.places), len(self.rows)
+        fine = size + more <= MOST_UNKNOWNS and more * size**2 <= MOST_ENTRIES
+        need(fine, f"{self.name}: these are too many coordinates and functions for this checker")
 
     def placed(
         self, sharp: list[list[float]], record: dict[str, Any], index: Any, given: frozenset[int]
@@ -68,11 +80,14 @@ class StoredRegion:
         p = self.p
         slack = [arb(0, 2.0**-70) * (1 + abs(x)) for x in self.unknowns]
         near = [x + y for x, y in zip(hull(*sharp), slack, strict=True)]
-        inside = all(x.contains(y) for x, y in zip(near, self.unknowns, strict=True))
-        need(inside, f"{self.name}: the solution is elsewhere")
+        # Of wide sets of solutions, for all values of parameters, this enclosure may be the wider.
+        fits = arb.overlaps if p.parameters else arb.contains
+        known = all(fits(x, y) for x, y in zip(near, self.unknowns, strict=True))
+        need(known, f"{self.name}: the solution is elsewhere")
         self.point = self.at(self.unknowns)
-        self.outside = p.is_outside(self.point, self.places)
-        self.far = p.is_outside(self.point, self.places, BESIDE)
+        self.inside = p.inside(self.point, self.places)
+        self.outside = self.inside is False
+        self.far = not p.inside(self.point, self.places, BESIDE)
         v = p.values(self.point)
         signs = p.signs(v)
         self.zeros = given | {i for i in range(p.m) if nothing(v[p.outputs[i]])}
@@ -191,7 +206,7 @@ class StoredRegion:
         """Whether the sample, with the coordinates of the locus instead, is in the set."""
         sample = sides(record, ("sample", "sample"), self.p.n)[0]
         moved = set(self.p.free) - set(self.places)
-        if self.p.is_outside([arb(x) for x in sample], sorted(moved)):
+        if not self.p.inside([arb(x) for x in sample], sorted(moved)):
             return False
         q = [arb(x) if i in moved else self.point[i] for i, x in enumerate(sample)]
         signs = self.p.signs(self.p.values(q))

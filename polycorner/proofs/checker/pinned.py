@@ -26,11 +26,15 @@ class StoredPin(StoredRegion):
         self.name, n, corner = f"region of {record['active']}", len(p.free), {*record["corner"]}
         plain = not p.k and not p.parameters
         need(plain and len(p.branches) == 1, f"{self.name}: not of one intersection")
-        fine = corner <= self.active <= set(range(p.m)) and len(corner) == n
+        # A function that the set does not ask for may be negative in it, and hold nothing.
+        fine = corner <= self.active and all(self.active <= b for b in p.branches)
+        fine = fine and len(corner) == n
         need(fine, f"{self.name}: the functions")
         ends = sides(record, ("lower", "upper"), p.n)
         self.lower, self.upper = ([side[i] for i in p.free] for side in ends)
         sharp = sides(record, ("sharp_lower", "sharp_upper"), n + len(self.active))
+        self.rows = [*sorted(self.active), p.m]
+        self.limit()
         self.rows = sorted(corner)
         start = [x + arb(0, NEAR) * (1 + abs(x)) for x in hull(*sharp)[:n]]
         point = zero(self.vanishing, start)

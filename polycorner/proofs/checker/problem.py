@@ -11,12 +11,11 @@ from .operations import LOGICAL, SLOPES, VALUES, arity, chain, ordered, unite
 FORMAT, CORNERS = ["polycorner-stationary-list", 1], ["polycorner-corner-list", 1]
 
 
-class StoredProblem:
-    """The problem of a file: a program of the functions, the branches of the set, the domain."""
+class StoredProgram:
+    """The functions of a file as one program, and the branches of the set."""
 
-    def __init__(self, data: dict[str, Any]) -> None:
-        ctx.prec = BITS
-        need(data["format"] in (FORMAT, CORNERS), f"the format is {data['format']}, not {FORMAT}")
+    def __init__(self, data: dict[str, Any], bits: int = BITS) -> None:
+        ctx.prec = bits
         self.names: list[str] = data["coordinates"]
         different(self.names, "a coordinate is named")
         need(all(name.isidentifier() for name in self.names), "names of coordinates")
@@ -33,22 +32,13 @@ class StoredProblem:
         need(self.truths.isdisjoint(self.outputs), "functions have numbers for values")
         self.needs = [self.needed(output) for output in self.outputs]
         self.branches = {frozenset(places(b, self.m, "branches")) for b in data["branches"]}
-        self.lower, self.upper = sides(data["domain"], ("lower", "upper"), self.n)
-        self.anywhere = hull(self.lower, self.upper)
-        self.widths = [b - a for a, b in zip(self.lower, self.upper, strict=True)]
-        moving = [i for i in range(self.n) if self.widths[i] > 0]
-        need(data["fixed"] == [i for i in range(self.n) if i not in moving], "fixed coordinates")
-        self.parameters = places(data["parameters"], self.n, "parameters")
-        need(set(self.parameters) <= set(moving), "parameters")
-        self.free = [i for i in moving if i not in self.parameters]
-        self.minima_only: bool = data["minima_only"]
-        need(type(self.minima_only) is bool, "minima_only is true or false")
         self.periods = [None if p is None else number(p) for p in data["periods"]]
         fine = all(period is None or period > 0 for period in self.periods)
         need(fine and len(self.periods) == self.n, "periods")
 
     def add(self, op: str, args: list[Any]) -> None:
         place = len(self.nodes)
+        need(op not in {"const", "var"} or len(args) == 1, f"{op} of {args}")
         if op == "const":
             self.known[place] = number(args[0])
         else:
@@ -75,6 +65,21 @@ class StoredProblem:
                 seen.add(a)
                 waiting += [] if op == "var" else args[1:] if op == "select" else args
         return sorted(seen)
+
+    def inputs(self, node: int) -> list[int]:
+        """Return all nodes that a node is computed from, and itself, in order."""
+        seen, waiting = set[int](), [node]
+        while waiting:
+            op, args = self.nodes[a := waiting.pop()]
+            if a not in seen:
+                seen.add(a)
+                waiting += [] if op in {"const", "var"} else args
+        return sorted(seen)
+
+    def reads(self, row: int) -> frozenset[int]:
+        """Return the coordinates from which a function is computed."""
+        nodes = (self.nodes[a] for a in self.inputs(self.outputs[row]))
+        return frozenset(args[0] for op, args in nodes if op == "var")
 
     def values(self, box: Sequence[arb]) -> list[Any]:
         v: list[Any] = []
@@ -111,8 +116,35 @@ class StoredProblem:
 
     def signs(self, v: list[Any]) -> list[int]:
         """Return the signs of inequalities and equations, 0 where they are not decided."""
-        rows = (v[output] for output in self.outputs[:-1])
+        rows = (v[output] for output in self.outputs[: self.m + self.k])
         return [1 if x > 0 else -1 if x < 0 else 0 for x in rows]
+
+    def open_sets(self, signs: list[int], zeros: frozenset[int] = frozenset()) -> list[Any]:
+        """Return the functions that have to hold in each branch and may vanish; least sets only."""
+        if any(signs[self.m :]):
+            return []
+        below, above = ({i for i in range(self.m) if signs[i] == s} - zeros for s in (-1, 1))
+        sets = {branch - above for branch in self.branches if not branch & below}
+        return [u for u in sets if not any(smaller < u for smaller in sets)]
+
+
+class StoredProblem(StoredProgram):
+    """The problem of a list: its functions, its set and the domain."""
+
+    def __init__(self, data: dict[str, Any]) -> None:
+        super().__init__(data)
+        need(data["format"] in (FORMAT, CORNERS), f"the format is {data['format']}, not {FORMAT}")
+        self.lower, self.upper = sides(data["domain"], ("lower", "upper"), self.n)
+        self.anywhere = hull(self.lower, self.upper)
+        self.widths = [b - a for a, b in zip(self.lower, self.upper, strict=True)]
+        moving = [i for i in range(self.n) if self.widths[i] > 0]
+        need(data["fixed"] == [i for i in range(self.n) if i not in moving], "fixed coordinates")
+        self.parameters = places(data["parameters"], self.n, "parameters")
+        need(set(self.parameters) <= set(moving), "parameters")
+        different(self.parameters, "a parameter is stated")
+        self.free = [i for i in moving if i not in self.parameters]
+        self.minima_only: bool = data["minima_only"]
+        need(type(self.minima_only) is bool, "minima_only is true or false")
 
     def sign(self, v: list[Any], row: int, memo: Any, lo: list[float], hi: list[float]) -> int:
         """Return the sign of a function from its values at two corners, by its slopes.
@@ -132,16 +164,18 @@ class StoredProblem:
                 return s
         return 0
 
-    def is_outside(self, point: Sequence[arb], some: Sequence[int], room: float = 0.0) -> bool:
-        """Whether a point is shown to lie beyond a side, or farther than what is rounded."""
+    def inside(self, point: Sequence[arb], some: Sequence[int], room: float = 0.0) -> bool | None:
+        """Whether a point lies between the sides, or no farther beyond than what is rounded."""
+        sure = True
         for i in some:
             x, a, b = point[i], self.lower[i], self.upper[i]
             more, period = room * (1 + abs(x)), self.periods[i]
             x += turn(x, a, b, period)
             whole = period is not None and self.widths[i] >= period
             if not whole and (x < a - more or x > b + more):
-                return True
-        return False
+                return False
+            sure &= whole or bool(x >= a - more and x <= b + more)
+        return sure or None
 
     def where(self) -> str:
         """Return the domain in words; numbers as they are."""
@@ -151,11 +185,3 @@ class StoredProblem:
         said += [f"with {name} = {a}" for name, a, b in ends if a == b]
         said += [f"for all {ends[i][0]} from {ends[i][1]} to {ends[i][2]}" for i in self.parameters]
         return ", ".join(said)
-
-    def open_sets(self, signs: list[int], zeros: frozenset[int] = frozenset()) -> list[Any]:
-        """Return the functions that have to hold in each branch and may vanish; least sets only."""
-        if any(signs[self.m :]):
-            return []
-        below, above = ({i for i in range(self.m) if signs[i] == s} - zeros for s in (-1, 1))
-        sets = {branch - above for branch in self.branches if not branch & below}
-        return [u for u in sets if not any(smaller < u for smaller in sets)]

@@ -1,6 +1,7 @@
 """Proof in a file: why each of its boxes is closed."""
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from math import comb
 from typing import Any
@@ -24,7 +25,8 @@ class StoredProof:
     related: Sequence[frozenset[int]] = ()  # functions with linear relations, tested
     loci: Sequence[StoredRegion] = ()
     ways: Sequence[list[float]] = ()
-    counted = open = beside = 0  # points; those that may be; those beyond a side by rounding
+    points: Sequence[Any] = ()  # regions of those that are counted
+    open = unproved = 0  # points that may be; linear relations that are tested
 
     def __init__(self, data: dict[str, Any]) -> None:
         self.p = p = StoredProblem(data)
@@ -38,7 +40,7 @@ class StoredProof:
             sides(r, ("way", "way"), p.n)[0] if "way" in r else [] for r in data["regions"]
         ]
         self.loci = [StoredRegion(p, r, r["z"], None) for r in data["loci"]]
-        self.symmetries = symmetries(p, data)
+        self.symmetries, self.periodic = symmetries(p, data)
         self.tested = sum(region.tested for region in self.regions)
 
     def closed(self, lower: list[float], upper: list[float], hints: list[Any]) -> bool:
@@ -203,18 +205,32 @@ class StoredProof:
             self.compare(face, point)
             need(all(face.same(f) is False for f in claimed), f"{face.name}: is listed twice")
             claimed.append(face)
-        named, sure = list(claimed), len(claimed)
+        named, self.points = list(claimed), list(claimed)
         for number in open_:
             face, alike = self.regions[number], [self.regions[number].same(f) for f in named]
             if self.is_absent(number) or True in alike:
                 continue
-            sure += bool(face.listable and not any(x is None for x in alike))
             named.append(face)
+            if face.listable and not face.far and None not in alike:
+                self.points.append(face)
         for number, face in enumerate(self.regions):
             known = self.is_absent(number) or any(face.same(f) for f in named)
             need(known, f"{face.name}: is not listed")
-        self.counted, self.open = sure, len(named) - sure
-        self.beside = sum(face.outside for face in claimed)
+        self.open = len(named) - len(self.points)
+
+    def indices(self) -> Iterator[str]:
+        """Yield how many of the points that are counted have an index.
+
+        It is not that of the face where other functions may vanish, unless it is 0.
+        """
+        shown = [face.index if face.free or face.index == 0 else None for face in self.points]
+        for index, number in sorted(Counter(shown).items(), key=str):
+            yield f"{number} of {'undecided index' if index is None else f'index {index}'}"
+
+    def energies(self) -> list[arb]:
+        """Return the energies of the local minima that are counted."""
+        minima = [self.p.values(face.point) for face in self.points if face.index == 0]
+        return sorted((v[self.p.outputs[-1]] for v in minima), key=arb.mid)
 
     def distinct(self) -> list[StoredRegion]:
         """Return loci that are not beside the domain, of minima if only these are listed, once."""

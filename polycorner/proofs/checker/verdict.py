@@ -10,31 +10,66 @@ import zipfile
 from array import array
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from functools import reduce
 from itertools import islice
 from multiprocessing import parent_process
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from flint import arb
+
 from .balls import moved, need
 from .corners import StoredCorners
 from .problem import CORNERS, StoredProblem
 from .proof import StoredProof
+from .statement import PROOF
+from .statements import stated
 
+DIGITS, MOST_TOLD = 10, 8  # of energies; energies that are told one by one
 CHUNK = 500  # leaves that a worker checks at a time
 MOST_UNPACKED = 200  # bytes for each of a file; deflate packs a thousand zeros into one
+MOST_TEXT = 2**24  # bytes of a description, which take twenty times the memory when they are read
+PIECE = 2**16  # bytes that are unpacked at a time
+
+
+def unpacked(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
+    """Return a part of a file, read bit by bit: what the archive says of sizes may be untrue."""
+    found = [part for part in archive.filelist if part.filename == name]
+    need(len(found) == 1, f"{len(found)} parts are called {name}")
+    (part,) = found
+    plain = part.compress_type in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+    need(plain and not part.flag_bits & 1, f"{name} is encrypted, or packed in an unusual way")
+    content = bytearray()
+    with archive.open(part) as file:
+        while piece := file.read(PIECE):
+            content += piece
+            need(len(content) <= most, f"{name} is far too large")
+    return bytes(content)
+
+
+def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a record, whose entries may not be stated twice."""
+    found = dict(pairs)
+    need(len(found) == len(pairs), f"{[name for name, _ in pairs]}: an entry is stated twice")
+    return found
 
 
 def contents(path: str) -> tuple[dict[str, Any], list[Any]]:
     kinds, parts = {"tree": "b", "positions": "d", "counts": "H", "directions": "f"}, []
+    need(not Path(path).exists() or Path(path).is_file(), f"{path} is no file")
     with zipfile.ZipFile(path) as archive:
         room = MOST_UNPACKED * Path(path).stat().st_size
         need(sum(part.file_size for part in archive.filelist) <= room, "a part is far too large")
+        text = unpacked(archive, "problem.json", min(room, MOST_TEXT))
+        data = json.loads(text, object_pairs_hook=once)
+        if data["format"] == PROOF:
+            return data, []
         for name, kind in kinds.items():
-            parts.append(array(kind, archive.read(f"{name}.bin")))
+            parts.append(array(kind, unpacked(archive, f"{name}.bin", room)))
             if sys.byteorder == "big":
                 parts[-1].byteswap()
-        return json.loads(archive.read("problem.json")), parts
+    return data, parts
 
 
 def leaves(
@@ -83,6 +118,8 @@ def failing(chunk: list[Any]) -> Any:
 def check(path: str, sample: int | None, jobs: int) -> str:
     """Check a file; return the verdict."""
     (data, parts), started, done = contents(path), time.monotonic(), 0
+    if data["format"] == PROOF:
+        return f"verified: {stated(data)}"
     begin(data)
     proof, (total, opened) = WORKER[0], (parts[0].count(code) for code in (-1, -2))
     proof.check_list(data)
@@ -109,16 +146,27 @@ def check(path: str, sample: int | None, jobs: int) -> str:
 
 def said(proof: StoredProof) -> Iterator[str]:
     """Yield what a proof shows of points and loci, once its list is checked."""
-    images = f" and their images under {len(proof.symmetries)} symmetries (tested, not proved)"
-    yield f"{proof.counted} {proof.kind}{images if proof.symmetries else ''}"
+    tested = sum(not g.proved for g in proof.symmetries)
+    images = f" and their images under {len(proof.symmetries)} symmetries"
+    images += f" ({tested} of them tested, not proved)" if tested else ""
+    yield f"{len(proof.points)} {proof.kind}{images if proof.symmetries else ''}"
+    yield from proof.indices() if proof.kind == "stationary points" else ()
+    if energies := proof.energies():
+        few = [x.str(DIGITS) for x in energies]
+        ends = reduce(arb.min, energies), reduce(arb.max, energies)
+        told = ", ".join(few) if len(few) <= MOST_TOLD else " to ".join(x.str(DIGITS) for x in ends)
+        yield f"energies of the minima {told}"
+    if proof.periodic:
+        yield f"periods of {' and '.join(proof.periodic)} (tested, not proved)"
     loci = proof.distinct()
+    on_sides = sum(not place.inside for place in [*proof.points, *loci])
     for number, what in (
-        (proof.beside, "of them beside the box by rounding"),
-        (len(set(proof.related)), "linear relations (tested, not proved)"),
+        (proof.unproved, "linear relations (tested, not proved)"),
         (proof.open, "that may be"),
         (proof.tested, "zeros at points (tested, not proved)"),
         (sum(place.met for place in loci), "loci"),
         (sum(not place.met for place in loci), "loci that may be empty"),
+        (on_sides, "of them on a side of the box or beside it by rounding"),
     ):
         if number:
             yield f"{number} {what}"

@@ -27,6 +27,7 @@ class StoredVertex(StoredRegion):
         self.name = f"region {record}"
         need(self.active <= set(range(p.m)), self.name)
         self.rows = [*sorted(self.active), *range(p.m, p.m + p.k)]
+        self.limit()
         ends = sides(record, ("lower", "upper"), p.n)
         self.lower, self.upper = ([side[i] for i in p.free] for side in ends)
         self.critical: frozenset[int] = frozenset()

@@ -66,10 +66,13 @@ class Domain(Value):
         away = (upper < self.lower[at]) | (lower > self.upper[at])
         return bool((away & ~whole).any())
 
-    def holds(self, lower: Array, upper: Array) -> bool:
-        """Whether a box in all coordinates lies inside, circles that are whole apart."""
-        whole = self.upper - self.lower >= self.manifold.periods
-        return bool(((lower >= self.lower) & (upper <= self.upper) | whole).all())
+    def holds(self, lower: Array, upper: Array, room: float = 0.0) -> bool:
+        """Whether a box in all coordinates lies inside, circles that are whole apart.
+
+        Or at most ``room`` beyond a side, in scale units.
+        """
+        whole, more = self.upper - self.lower >= self.manifold.periods, room * self.units
+        return bool(((lower >= self.lower - more) & (upper <= self.upper + more) | whole).all())
 
     def within(
         self, lower: Array, upper: Array, left: Array, right: Array, places: Sequence[int]

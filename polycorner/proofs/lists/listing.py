@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from polycorner.minimisation.problem import Problem
-from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.domains import ROUNDING, Domain
 from polycorner.proofs.lists.images import Motion
 from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.members import (
@@ -113,8 +113,15 @@ def loci_of(search: BoxSearch) -> list[LocusRegion]:
             if not domain.misses(*sharp, z) and not any(
                 domain.within(*sharp, other.lower, other.upper, z) for other in found
             ):
-                found.append(image)
+                found.append(image if _is_held(domain, image) else replace(image, sample=None))
     return found
+
+
+def _is_held(domain: Domain, place: LocusRegion) -> bool:
+    """Whether a locus is in the domain for all values of the parameters, but for rounding."""
+    lower, upper, z = domain.lower.copy(), domain.upper.copy(), list(place.z)
+    lower[z], upper[z] = place.sharp_lower, place.sharp_upper
+    return domain.holds(lower, upper, ROUNDING)
 
 
 def _locus_image(search: BoxSearch, place: LocusRegion, g: Motion) -> LocusRegion:

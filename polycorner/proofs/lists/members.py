@@ -6,6 +6,7 @@ import numpy as np
 
 from polycorner.intervals.balls import ball, precision
 from polycorner.proofs.lists.coincidences import ZERO, Place, signs
+from polycorner.proofs.lists.domains import ROUNDING
 from polycorner.proofs.lists.examination import without_minima
 from polycorner.proofs.lists.faces import BITS, Region, enclosing
 from polycorner.proofs.lists.images import Motion
@@ -215,7 +216,9 @@ def judged(search: BoxSearch, region: Region) -> Member:
     fewer = [less and not (c & zeros & ~held).any() for c, less in zip(possible, some, strict=True)]
     if any(a and b for a, b in zip(sure, fewer, strict=True)):
         return Member(region, *sets, OUT, free)
-    return Member(region, *sets, IN if any(sure) and not any(some) else OPEN, free)
+    # With parameters a point may be in the domain for some of their values and not for others.
+    held_in = search.domain.holds(lower, upper, ROUNDING)
+    return Member(region, *sets, IN if held_in and any(sure) and not any(some) else OPEN, free)
 
 
 def placed(search: BoxSearch, region: Region) -> Place:

@@ -21,26 +21,20 @@ corners have the exact point, the combination of gradients that vanishes, the we
 functions whose gradient vanishes.  Linear relations of functions are stated with their weights.
 """
 
-import io
 import json
-import math
 import os
-import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.atomic import write_atomically
-from polycorner.formulas.programs import Graph
-from polycorner.formulas.ranges import pattern, reads
 from polycorner.intervals.enclosures import Formulas
 from polycorner.minimisation.problem import Problem
+from polycorner.proofs.files import archived, stated
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.faces import Region
 from polycorner.proofs.lists.images import Motion
@@ -58,7 +52,6 @@ CORNERS = ("polycorner-corner-list", 1)
 SIDES = ("lower", "upper", "sharp_lower", "sharp_upper")
 EXACT = ("exact", "combination")
 PINNED = ("into", "steps", "weights")
-MOST_TURNS = 64  # periods up to this multiple of pi are taken for exact ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +139,7 @@ def save(path: str | os.PathLike[str], record: Record) -> Path:
         "counts.bin": record.counts.astype("<u2").tobytes(),
         "directions.bin": record.directions.astype("<f4").tobytes(),
     }
-    memory = io.BytesIO()
-    with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in parts.items():
-            # ZipInfo's date is fixed: the same list is the same file, whenever it is written.
-            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
-    return write_atomically(path, memory.getvalue(), suffix=".zip")
+    return archived(path, parts)
 
 
 def described(record: Record) -> dict[str, Any]:
@@ -183,18 +171,9 @@ def described(record: Record) -> dict[str, Any]:
 def posed(record: "Record | BoxSearch") -> dict[str, Any]:
     """Return a problem with its domain and symmetries as plain data."""
     problem, domain = record.problem, record.domain
-    manifold = problem.polyhedron.manifold
-    formulas = Formulas(problem.functions, manifold)
-    nodes, outputs = program(formulas.graph, formulas.outputs)
-    return {
-        "coordinates": list(manifold.names),
-        "periods": [period(p) for p in manifold.periods],
-        "functions": list(formulas.names),
-        "inequalities": problem.inequalities,
-        "equations": problem.rows - 1 - problem.inequalities,
-        "branches": [list(branch) for branch in record.branches],
-        "nodes": nodes,
-        "outputs": outputs,
+    formulas = Formulas(problem.functions, problem.polyhedron.manifold)
+    data, _ = stated(problem, formulas, record.branches)
+    return data | {
         "domain": {"lower": _hex(domain.lower), "upper": _hex(domain.upper)},
         "fixed": list(domain.fixed),
         "parameters": list(domain.parameters),
@@ -202,42 +181,6 @@ def posed(record: "Record | BoxSearch") -> dict[str, Any]:
         "symmetries": [_motion(g) for g in record.motions],
         "weights": _hex(record.weights),
     }
-
-
-def program(graph: Graph, outputs: Sequence[int]) -> tuple[list[list[Any]], list[int]]:
-    """Return the operations that outputs need, renumbered, and the outputs.
-
-    Selections that are a minimum, a maximum or an absolute value are written as such.
-    """
-    places: dict[int, int] = {}
-    nodes: list[list[Any]] = []
-    for a in graph.needed(outputs, partial(reads, graph)):
-        op, args = graph.nodes[a]
-        found = pattern(graph, a)
-        if found:
-            op = found.kind.removeprefix("-")
-        if op in {"const", "var"}:
-            nodes.append([op, str(args[0]) if op == "const" else int(args[0])])
-        else:
-            nodes.append([op, *(places[b] for b in reads(graph, a))])
-        if found and found.kind == "-abs":
-            nodes.append(["neg", len(nodes) - 1])
-        places[a] = len(nodes) - 1
-    return nodes, [places[a] for a in outputs]
-
-
-def period(value: float) -> str | None:
-    """Return a period as an exact number: a multiple of pi if it is one, None for lines.
-
-    >>> period(2 * math.pi), period(0.5), period(math.inf)
-    ('2 pi', '1/2', None)
-    """
-    if not math.isfinite(value):
-        return None
-    turns = Fraction(value / math.pi).limit_denominator(MOST_TURNS)
-    if turns and float(turns) * math.pi == value:
-        return f"{turns} pi"
-    return str(Fraction(value))
 
 
 def _hex(values: Array) -> list[str]:

@@ -23,11 +23,11 @@ from polycorner.errors import NonsmoothWarning
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.enclosures import Formulas
 from polycorner.polyhedra.symmetry import Element, Symmetry
-from polycorner.proofs import checker
+from polycorner.proofs import checker, files
 from polycorner.proofs.checker import balls, problem
 from polycorner.proofs.checker.__main__ import main
 from polycorner.proofs.checker.proof import StoredProof
-from polycorner.proofs.lists import records, search
+from polycorner.proofs.lists import search
 from polycorner.proofs.lists.enumeration import stationary_points
 
 PLANE = Manifold.euclidean("x y")
@@ -421,7 +421,7 @@ FORMULAS = (
 def test_derivatives_are_those_of_sympy(formula, monkeypatch):
     monkeypatch.setattr(flint.ctx, "prec", 128)
     formulas = Formulas([SmoothFunction("f", formula, PLANE)], PLANE)
-    nodes, outputs = records.program(formulas.graph, formulas.outputs)
+    nodes, outputs = files.program(formulas.graph, formulas.outputs)
     posed = stated(nodes, outputs).p
     place = {x: sp.Rational(5, 8), y: sp.Rational(7, 4)}
     box = [flint.arb(float(value), 2.0**-30) for value in place.values()]
@@ -450,6 +450,42 @@ def stated(nodes, outputs, **more):
     return StoredProof({**data, **empty, "nodes": nodes, "outputs": outputs, **more})
 
 
+TURNS = {
+    "half a turn": {"order": [0, 1], "signs": [1, 1], "shifts": ["0", "1/2"]},
+    "mirror": {"order": [0, 1], "signs": [1, -1], "shifts": ["0", "0"]},
+    "mirror and half a turn": {"order": [0, 1], "signs": [-1, -1], "shifts": ["0", "1/2"]},
+}
+ENERGIES = [sp.cos(2 * y), sp.sin(2 * y) ** 2, sp.sin(y) ** 2, sp.cos(y), sp.sin(y), sp.sin(3 * y)]
+ENERGIES += [sp.exp(sp.cos(2 * y)) / (2 + sp.cos(4 * y)), x * sp.cos(y), x**2 - sp.Abs(sp.sin(y))]
+ENERGIES += [
+    sp.sqrt(2 + sp.sin(y)),
+    sp.cos(y + sp.pi / 4) ** 2,
+    sp.tan(x * sp.cos(y)),
+    x * sp.sin(y),
+]
+
+
+@pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("energy", ENERGIES, ids=str)
+def test_algebra_shows_the_symmetries_and_no_others(energy, turn, monkeypatch):
+    monkeypatch.setattr(flint.ctx, "prec", 128)
+    formulas = Formulas([SmoothFunction("E", energy, PLANE)], PLANE)
+    nodes, outputs = files.program(formulas.graph, formulas.outputs)
+    g = TURNS[turn]
+    shift = np.pi if g["shifts"][1] == "1/2" else 0.0
+    compute = sp.lambdify((x, y), energy)
+    q = np.random.default_rng(0).uniform(0, 1, (2, 50))
+    image = compute(g["signs"][0] * q[0], g["signs"][1] * q[1] + shift)
+    more = {"periods": [None, "2 pi"], "symmetries": [g]}
+    if np.allclose(image, compute(*q)):
+        proof = stated(nodes, outputs, **more)
+        assert (proof.symmetries[0].proved, proof.periodic) == (True, [])
+    else:
+        with pytest.raises(balls.NotShownError, match="changes the problem"):
+            stated(nodes, outputs, **more)
+
+
 @pytest.mark.parametrize("level", ["-1", "1/2"])
 def test_a_locus_of_an_energy_that_selects_by_another_coordinate_is_refused(level, monkeypatch):
     """The energy is (x - 1/4)^2 or (x - 3/4)^2, whichever ``y < level`` asks for."""
@@ -474,7 +510,7 @@ def test_boxes_enclose_what_their_points_give(formula, seed):
     """Values and gradients at points of a box lie in those of the box, where these are finite."""
     rng, before = np.random.default_rng(seed), flint.ctx.prec
     formulas = Formulas([SmoothFunction("f", formula, PLANE)], PLANE)
-    nodes, outputs = records.program(formulas.graph, formulas.outputs)
+    nodes, outputs = files.program(formulas.graph, formulas.outputs)
     posed = stated(nodes, outputs).p
     lower = rng.uniform(-1, 2, 2)
     upper = lower + rng.exponential(0.5, 2)

@@ -3,8 +3,10 @@
 Each field of a file is changed in turn, everything else being as it was.
 """
 
+import contextlib
 import copy
 import json
+import re
 import struct
 import zipfile
 
@@ -12,8 +14,9 @@ import numpy as np
 import pytest
 import sympy as sp
 from proof_files import changed, verdict
+from stored_problems import solved
 
-from polycorner import Manifold, Polyhedron
+from polycorner import AnyOf, Manifold, Polyhedron, SmoothFunction
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs import corners, stationary_points
 
@@ -26,6 +29,10 @@ BOWL = Polyhedron(PLANE, {"bowl": y - x**2, "lid": 2 - y})
 DISC = Polyhedron(PLANE, {"disc": 1 - x**2 - y**2})
 PIPE = Polyhedron(TUBE, {"up": 1 - z, "down": 1 + z})
 PLANES = Polyhedron(PLANE, {"a": x + y, "b": x - y, "c": x, "d": 1 - x - y / 2})
+ARC = Polyhedron(PLANE, {"up": y}, {"circle": 1 - x**2 - y**2})
+DISCS = Polyhedron(PLANE, [AnyOf(1 - x**2 - y**2, 1 - (x - 1) ** 2 - y**2)])
+FAN = Polyhedron(PLANE, [y, y - x, y + x])
+DISTANCE = SmoothFunction("E", (x - sp.Symbol("a")) ** 2 + y**2, PLANE, parameters={"a": 0.2})
 SIDES = [(-2, 2), (-2, 2)]
 
 
@@ -42,6 +49,13 @@ MADE = {
         PIPE, sp.cos(2 * t) + z**2, box=[(-2, 2), None], symmetry=HALF_TURNS
     ),
     "corners": lambda: corners(PLANES, box=SIDES),
+    "tip": lambda: corners(Polyhedron(PLANE, {"above": y - x**2, "below": -y - x**2}), box=SIDES),
+    "arc": lambda: stationary_points(ARC, x + 2 * y, box=[(-2, 2), (-2, 2)]),
+    "union": lambda: stationary_points(DISCS, x + 2 * y, box=[(-3, 3), (-3, 3)]),
+    "held to first order": lambda: stationary_points(FAN, y - x**2, box=[(-1, 1), (-1, 1)]),
+    "parameter": lambda: stationary_points(
+        DISC, DISTANCE, box=[(-0.5, 0.5), (-0.5, 0.5)], parameters={"a": (0.125, 0.25)}
+    ),
 }
 
 
@@ -73,12 +87,16 @@ def write(path, parts):
 def fields(data, path=()):
     """Yield the places of values in nested lists and dictionaries, with these.
 
-    Of records of one kind the first stands for all.
+    Of regions and points of one kind the first stands for all.
     """
     yield path, data
     keys = data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ()
-    for key in list(keys)[:1] if isinstance(data, list) and dict in map(type, data) else keys:
-        yield from fields(data[key], (*path, key))
+    kinds = set()
+    for key in list(keys):
+        kind = repr(sorted(data[key])) if isinstance(data[key], dict) else repr(key)
+        if isinstance(data, dict) or kind not in kinds:
+            yield from fields(data[key], (*path, key))
+        kinds.add(kind)
 
 
 def forgeries(value):
@@ -86,12 +104,20 @@ def forgeries(value):
     if isinstance(value, bool):
         return [not value, int(value), "false", None]
     if isinstance(value, int):
-        return [value + 1, -1, True, 10**6]
+        return [value + 1, value - 1, -1, True, float(value), str(value), 10**6, None]
     if isinstance(value, list):
-        return [[], value + value[-1:], value[:-1], value[::-1]]
+        swapped = [value[1], value[0], *value[2:]] if len(value) > 1 else []
+        some = [[], value + value[-1:], value[:-1], value[1:], value[::-1], swapped]
+        return [*some, None, {}, [value]]
     if isinstance(value, dict):
-        return [{k: v for k, v in value.items() if k != gone} for gone in value]
-    return ["2 pi", "nan"] if value is None else ["", "-1", None]
+        return [*({k: v for k, v in value.items() if k != gone} for gone in value), None, []]
+    if value is None:
+        return ["2 pi", "1", "nan", 0]
+    with contextlib.suppress(ValueError):
+        x = float.fromhex(value)
+        others = [-x, 2 * x, x + 1, 0.0, x * (1 + 2.0**-40), np.inf]
+        return [*(float(y).hex() for y in others), "", value + " ", None, 0]
+    return ["", "-1", "0", "2", "x", "sin", "cos", "add", "sub", f"{value} ", value[::-1], None, 0]
 
 
 def with_value(data, path, value):
@@ -105,28 +131,44 @@ def with_value(data, path, value):
     return forged
 
 
-# Fields with which the sentence changes and stays true: the names of coordinates; in which box; all
-# points of these lists but the saddle are minima; a locus need not be shown to have points.
-TRUE_WORDS = {
-    "saddle and minima": {("coordinates",), ("domain",)},
-    "minima": {("coordinates",), ("domain",), ("minima_only",)},
-    "locus": {("coordinates",), ("domain",), ("minima_only",), ("loci", 0, "sample")},
-    "half turns": {("coordinates",), ("domain",)},
-    "corners": {("coordinates",), ("domain",)},
-}
+PROBLEM = (
+    "format",
+    "coordinates",
+    "periods",
+    "inequalities",
+    "equations",
+    "branches",
+    "nodes",
+    "outputs",
+)
+PROBLEM += ("domain", "fixed", "parameters", "minima_only", "symmetries")
+
+
+def sentence(line):
+    """Return a verdict without what depends on the proof: leaves, and the widths of enclosures."""
+    return re.sub(r" \+/- [^]]*|\d+ leaves", "", line)
 
 
 @pytest.mark.parametrize("name", MADE)
-def test_a_forged_field_is_refused_or_changes_no_word(name, files, tmp_path):
+def test_what_is_said_of_a_forged_file_is_true(name, files, tmp_path):
+    """It is refused, or says the same of the same problem, or what is found for its own problem."""
     parts = parts_of(files(name))
     data, (fine, line) = json.loads(parts["problem.json"]), verdict(files(name))
     assert fine, line
+    known = {json.dumps([data[key] for key in PROBLEM]): sentence(line)}
     for path, value in fields(data):
         for forged in forgeries(value):
-            parts["problem.json"] = json.dumps(with_value(data, path, forged))
+            told = with_value(data, path, forged)
+            parts["problem.json"] = json.dumps(told)
             verified, said = verdict(write(tmp_path / "forged.zip", parts))
-            words = {path[:1], path} & TRUE_WORDS[name]
-            assert not verified or said == line or words, (path, value, forged, said)
+            if not verified or path == ("loci", 0, "sample"):  # without, a locus may be empty
+                continue
+            posed = json.dumps([told[key] for key in PROBLEM])
+            if told["symmetries"] and told["domain"] != data["domain"]:
+                continue  # which images are counted depends on the proof
+            if posed not in known:
+                known[posed] = sentence(verdict(solved(told).save(tmp_path / "own.zip"))[1])
+            assert sentence(said) == known[posed], (path, value, forged)
 
 
 def copied(files, name, tmp_path, change):
@@ -163,6 +205,38 @@ def test_relations_of_a_list_of_stationary_points_are_not_said_to_be_tested(file
 
     name = "saddle and minima"
     assert copied(files, name, tmp_path, relate) == verdict(files(name))
+
+
+def test_a_function_is_not_related_to_itself(files, tmp_path):
+    """As ``f - f = 0`` it would need no further attention, and its corners be lost."""
+
+    def lose(data):
+        data["relations"] = [
+            {"rows": [i, i], "weights": ["1", "-1"]} for i in range(data["inequalities"])
+        ]
+        data["regions"], data["points"] = [], []
+
+    fine, line = copied(files, "corners", tmp_path, lose)
+    assert not fine
+    assert "a function is stated twice" in line
+
+
+def test_a_period_or_symmetry_that_is_only_tested_is_said_to_be(files, tmp_path):
+    """A step of the energy at a place that no random point meets changes its period."""
+    assert verdict(files("half turns"))[1].count("tested, not proved") == 0
+
+    def step(data):
+        nodes, energy = data["nodes"], data["outputs"][-1]
+        t = nodes.index(["var", 1])
+        first = len(nodes)
+        nodes += [["const", "2"], ["sub", t, first], ["abs", first + 1], ["const", f"1/{2**30}"]]
+        nodes += [["lt", first + 2, first + 3], ["const", "1"], ["add", energy, first + 5]]
+        nodes += [["select", first + 4, first + 6, energy]]
+        data["outputs"][-1] = len(nodes) - 1
+        data["symmetries"] = []
+
+    path = changed(write(tmp_path / "step.zip", parts_of(files("half turns"))), step)
+    assert not verdict(path)[0] or "periods of t (tested, not proved)" in verdict(path)[1]
 
 
 def tall(side):
@@ -241,6 +315,22 @@ def test_derivatives_do_not_depend_on_how_a_node_is_named(files, tmp_path):
         data["outputs"] = [k - len(data["nodes"]) for k in data["outputs"]]
 
     assert not copied(files, "saddle and minima", tmp_path, rename)[0]
+
+
+def test_functions_that_the_set_does_not_ask_for_hold_no_point(files, tmp_path):
+    """A point that three functions hold is not lost where one of them may be negative."""
+
+    def lose(data):
+        gone = next(k for k, r in enumerate(data["regions"]) if r["active"] == [1, 2])
+        assert data["points"][0]["region"] == gone == 0
+        del data["regions"][0], data["points"][0]
+        for point in data["points"]:
+            point["region"] -= 1
+        data["branches"] = [[1, 2]]
+
+    fine, line = copied(files, "held to first order", tmp_path, lose)
+    assert not fine
+    assert "region of [0, 1, 2]: the functions" in line
 
 
 # ------------------------------------------------------------------------------- damaged archives

@@ -11,7 +11,7 @@ import sympy as sp
 from polycorner import AnyOf, Manifold, Polyhedron
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.enclosures import Formulas
-from polycorner.proofs.lists import records
+from polycorner.proofs import files
 from polycorner.proofs.lists.enumeration import stationary_points
 
 PLANE = Manifold(("x", "t"), (math.inf, math.tau), (1, 1))
@@ -79,7 +79,7 @@ def test_a_file_is_the_same_whenever_it_is_written(found, tmp_path, monkeypatch)
 )
 def test_programs_compute_their_functions(formula, operation):
     formulas = Formulas([SmoothFunction("f", formula, LINES)], LINES)
-    nodes, (output,) = records.program(formulas.graph, formulas.outputs)
+    nodes, (output,) = files.program(formulas.graph, formulas.outputs)
     assert operation in {op for op, *_ in nodes}
     assert not {op for op, *_ in nodes} & {"select", "lt", "le"}
     for point in ((0.5, 0.25), (-1.5, 2.0), (3.0, -0.125)):
@@ -98,7 +98,7 @@ def test_programs_compute_their_functions(formula, operation):
     [(math.inf, None), (math.tau, "2 pi"), (math.pi / 3, "1/3 pi"), (0.75, "3/4"), (1.1, None)],
 )
 def test_periods_are_multiples_of_pi_or_the_doubles_they_are(value, text):
-    assert records.period(value) == (text if text or math.isinf(value) else str(sp.Rational(1.1)))
+    assert files.period(value) == (text if text or math.isinf(value) else str(sp.Rational(1.1)))
 
 
 def test_a_name_without_the_suffix_is_refused(found, tmp_path):
