@@ -53,11 +53,17 @@ def pytest_addoption(parser):
     parser.addoption(
         "--costs", action="store_true", help="record what tests cost, from which tiers are made"
     )
+    parser.addoption(
+        "--costs-cap",
+        type=int,
+        metavar="SECONDS",
+        help="with --costs, cut a test that has used so much processor time",
+    )
 
 
 def pytest_configure(config):
     if config.getoption("--costs"):
-        config.pluginmanager.register(costs.Recorder(costs.FILE))
+        config.pluginmanager.register(costs.Recorder(costs.FILE, config.getoption("--costs-cap")))
     seed = config.getoption("--disturbed")
     if seed is not None:
         Disturbed.install_once(seed)

@@ -48,6 +48,5 @@ def test_hostile_values_are_refused_by_name():
     assert not judged(QUICK, each)
 
 
-@pytest.mark.slow  # atlases, pictures and studies take seconds to make
 def test_hostile_values_of_slow_calls_are_refused_by_name():
     assert not judged(sorted(set(CALLS) & api_fuzz.SLOW), 1)

@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import in_threads
-import pytest
 
 from polycorner.formulas.cache import cache_folder
 
@@ -37,7 +36,6 @@ def test_threads_find_what_one_finds_with_kernels_that_are_not_compiled_yet(tmp_
     assert run(tmp_path, acts) == (0, [acts], "")
 
 
-@pytest.mark.slow
 def test_threads_find_what_one_finds_where_nothing_is_compiled(tmp_path):
     groups = [MIXED, *in_threads.ACTS]
     assert run(tmp_path, *groups) == (0, groups, "")

@@ -1,10 +1,16 @@
-"""Immutable values: content of their pickles, and arrays that cannot be written."""
+"""Immutable values: content of their pickles, arrays that cannot be written, other processes."""
 
 import copy
+import functools
 import pickle
+import re
 import threading
-from dataclasses import dataclass
+from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import FrozenInstanceError, dataclass, fields, is_dataclass
+from multiprocessing import get_context
 
+import api_calls
 import numpy as np
 import pytest
 
@@ -74,3 +80,85 @@ def test_a_cached_property_keeps_the_value_that_a_thread_finds_first():
     slow = Slow()
     quick = threading.Thread(target=lambda: found.append(slow.made))
     assert [slow.made, slow.made] == found * 2
+
+
+# ------------------------------------------------------------------------ those of the public names
+
+
+def parts(value):
+    """Return what a value is made of, by name, or None for a number, a word or a function."""
+    if isinstance(value, Mapping):
+        return {str(key): part for key, part in value.items()}
+    if isinstance(value, tuple | list):
+        return dict(enumerate(value))
+    if isinstance(value, set | frozenset):
+        return dict(enumerate(sorted(value, key=repr)))
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: getattr(value, field.name) for field in fields(value)}
+    return value.__getstate__() if isinstance(value, Value) else None
+
+
+def plain(text):
+    return re.sub(r" at 0x\w+", "", str(text))  # addresses differ between processes
+
+
+def content(value, within=()):
+    """Return a value as text, down to the last bits of its numbers."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype}{value.shape}{value.tolist()}"
+    inside = None if id(value) in within else parts(value)
+    if inside is None:  # formulas of a closure are written out when they are sent
+        return "a function" if callable(value) else plain(repr(value))
+    within = (*within, id(value))
+    named = (f"{name}: {content(part, within)}" for name, part in inside.items())
+    return f"{type(value).__name__}({', '.join(named)})"
+
+
+def everything(value):
+    """Return the content of a value, of what it computes on demand, and what is printed of it."""
+    yield plain(value)
+    yield content(value)
+    for kind in type(value).__mro__:
+        for name, found in vars(kind).items():
+            if isinstance(found, functools.cached_property) and not name.startswith("_"):
+                try:
+                    yield f"{name}: {content(getattr(value, name))}"
+                except ValueError as error:  # what this value does not have
+                    yield f"{name}: {error}"
+
+
+def returned(value):
+    return value, [*everything(value)]
+
+
+def arrays_of(value, within=()):
+    if isinstance(value, np.ndarray):
+        yield value
+    elif id(value) not in within:
+        for name, part in (parts(value) or {}).items():
+            if name != "state":  # of a search, for those that resume it
+                yield from arrays_of(part, (*within, id(value)))
+
+
+@pytest.fixture(scope="module")
+def spawned():
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        yield pool
+
+
+# A view owns a figure.
+@pytest.mark.parametrize("name", sorted(api_calls.VALUES.keys() - {"DrumView"}))
+def test_a_value_is_the_same_as_its_copies_and_in_a_spawned_process(name, spawned):
+    value = api_calls.VALUES[name]()
+    expected = [*everything(value)]
+    there, found = spawned.submit(returned, value).result()
+    assert found == expected
+    for other in (copy.copy(value), copy.deepcopy(value), pickle.loads(pickle.dumps(value)), there):
+        assert type(other) is type(value)
+        assert [*everything(other)] == expected
+        for array in arrays_of(other):
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0
+    if is_dataclass(value) and fields(value):
+        with pytest.raises(FrozenInstanceError):
+            setattr(value, fields(value)[0].name, None)

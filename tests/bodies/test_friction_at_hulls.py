@@ -122,7 +122,6 @@ def test_a_ball_rolls_down_a_brick():
     np.testing.assert_allclose(path.v[-1, 0, :3], expected, atol=1e-9)
 
 
-@pytest.mark.slow
 def test_repeated_blocks_stand_on_each_other():
     """A tower of three on a slope stays or slides as one, with friction everywhere."""
     block = rectangle(0.4, 0.2, 0.1)

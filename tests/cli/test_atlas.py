@@ -93,10 +93,7 @@ def test_disks_have_the_known_radii(arguments):
         assert row["hits"] > 0
 
 
-SLOW_DYAD = pytest.param(("dyad", "--plane"), marks=pytest.mark.slow)
-
-
-@pytest.mark.parametrize("arguments", [("tutorial",), SLOW_DYAD, ("spheres",)])
+@pytest.mark.parametrize("arguments", [("tutorial",), ("dyad", "--plane"), ("spheres",)])
 def test_the_seed_changes_nothing_but_the_order(arguments):
     one, other = (answer(*arguments, "--seed", seed) for seed in ("0", "5"))
     for key in ("components", "euler_characteristic", "complete"):
@@ -130,7 +127,7 @@ FILES = {
 
 @pytest.mark.parametrize(
     "arguments",
-    [pytest.param(a, marks=pytest.mark.slow) if "dyad" in a else a for a in FILES],
+    FILES,
     ids=" ".join,
 )
 def test_files_are_written(tmp_path, arguments):

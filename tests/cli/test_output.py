@@ -100,7 +100,6 @@ minimise(Polyhedron(M, {"wall": M.symbols[0]}), M.symbols[0], [1.0])
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("program", [COMMAND, PYTHON])
 def test_compiling_is_announced_when_something_is_compiled(program, tmp_path):
     """Once, where the package's intermediate code does not fit; the next process finds the code."""

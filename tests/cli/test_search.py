@@ -28,12 +28,8 @@ def _nothing_kept(own_searches):  # noqa: ARG001 - in whose folder they are
     [
         (("tutorial",), 3),
         (("spheres", "--count", "6"), 2),
-        pytest.param(("dyad", "--plane"), 15, marks=pytest.mark.slow),
-        pytest.param(
-            ("dyad", "--heading", "20", "--drum", "60", "--length", "20"),
-            20,
-            marks=pytest.mark.slow,
-        ),
+        (("dyad", "--plane"), 15),
+        (("dyad", "--heading", "20", "--drum", "60", "--length", "20"), 20),
     ],
     ids=str,
 )

@@ -56,7 +56,6 @@ def test_numbers_and_texts_are_read_or_refused_in_one_sentence(tmp_path):
     assert {found[name] for name in hostile_formulas.TEXTS} == {"refused"}
 
 
-@pytest.mark.slow  # two hundred kernels are compiled
 def test_towers_and_crowds_are_read_or_refused_in_one_sentence(tmp_path):
     chosen = (
         hostile_formulas.FAMILY.keys()

@@ -49,7 +49,6 @@ def made(tmp_path):
     return save_trajectory(motion(BALL, 1, 1, "floor"), tmp_path / "made.nc")
 
 
-@pytest.mark.slow
 def test_a_trajectory_is_read_bit_for_bit(path, saved):
     read = load_trajectory(saved, BALL)
     same(read, path)
@@ -57,7 +56,6 @@ def test_a_trajectory_is_read_bit_for_bit(path, saved):
     assert len(read.of_kind(EventKind.IMPACT)) == len(path.of_kind(EventKind.IMPACT)) > 0
 
 
-@pytest.mark.slow
 def test_the_file_alone_tells_of_a_ball(saved):
     """Energies and gaps from the numbers in the file, as mechanics has them."""
     with xr.open_dataset(saved, engine="h5netcdf") as file:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from polycorner.formulas.interval_kernels import LANES, IntervalKernel, best_rounding
+from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph
 from polycorner.formulas.ranges import outward, pattern
 from polycorner.intervals.balls import ball, bounds, constant, operations, precision
@@ -69,6 +70,26 @@ def test_true_values_lie_between_the_bounds(op, kind):
             true = exactly(op, q)
             assert not misses(true, below, above), (q.tolist(), below, above)
             assert true.is_finite() or (below, above) == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize("op", OPERATIONS)
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_sign_of_an_argument_that_is_known_leaves_products_of_values_right(op, side):
+    """``y f(x^2)`` and ``y f(-x^2)``: products depend on the signs of their factors."""
+    graph, rng = Graph(), np.random.default_rng(11)
+    x, y = graph.node("var", 0), graph.node("var", 1)
+    u = graph.node("mul", x, x) if side > 0 else graph.node("neg", graph.node("mul", x, x))
+    product = graph.node("mul", graph.node(op, u), y)
+    kernel = IntervalKernel(graph, 2, [[product]])
+    lo = rng.uniform(-3, 3, (150, 2)) * rng.choice([0.3, 1], (150, 1))
+    hi = lo + rng.choice([0.0, 0.1, 2.0], (150, 2))
+    low, high = bounded(kernel, lo, hi)
+    # What is undefined for all arguments of one sign has no bounds.
+    assert np.isfinite(low).any() or op in {"sqrt", "log"}
+    with precision(200):
+        for q, below, above in zip(inside(rng, lo, hi), low, high, strict=True):
+            one, two = (ball(Fraction(float(t))) for t in q)
+            assert not misses(operations()[op](side * one * one) * two, below, above)
 
 
 @pytest.mark.parametrize(("op", "kind"), EACH)

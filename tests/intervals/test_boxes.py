@@ -76,11 +76,7 @@ MODELS = {
 
 @pytest.mark.parametrize(
     ("model", "kind"),
-    [
-        pytest.param(model, kind, marks=pytest.mark.slow) if model == "drum" else (model, kind)
-        for model in MODELS
-        for kind in KINDS
-    ],
+    [(model, kind) for model in MODELS for kind in KINDS],
 )
 def test_functions_of_the_library_lie_in_their_enclosures(model, kind):
     members, manifold, reach = MODELS[model]()

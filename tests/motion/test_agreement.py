@@ -191,7 +191,6 @@ def test_both_steps_agree():
     assert checked(range(3), 4) == 1
 
 
-@pytest.mark.slow
 def test_both_steps_agree_on_many_systems():
     assert checked(range(3, 60), 8) > 0.98
 

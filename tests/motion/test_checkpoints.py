@@ -85,7 +85,6 @@ followed({folder!r})
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
 def test_a_killed_process_loses_nothing(whole, tmp_path):
     """Kill it again and again at random moments; it saves almost all the time."""
@@ -195,7 +194,6 @@ followed({folder!r}, progress=lambda *_: (print("running", flush=True), time.sle
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="the system has no SIGKILL")
 def test_a_process_that_is_killed_leaves_its_folder_free(whole, tmp_path):
     here = Path(__file__).parent

@@ -102,7 +102,7 @@ def assert_mean(values, expected, batches=40, errors=4.5):
     assert abs(np.mean(values) - expected) < errors * error
 
 
-@pytest.mark.parametrize("bounces", [2000, pytest.param(100_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("bounces", [2000, 100_000])
 def test_a_billiard_keeps_its_energy_and_fills_its_table(bounces):
     free = math.pi * AREA / PERIMETER
     _, path = launched(1.2 * bounces * free, 0.1, 7)

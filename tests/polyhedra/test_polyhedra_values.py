@@ -58,9 +58,3 @@ def test_groups_strata_and_symmetries(again):
 def test_a_spawned_process_computes_the_same():
     assert called(stratum_at, CONCAVE, [0.0, 0.0]) == stratum_at(CONCAVE, [0.0, 0.0])
     assert called(MIRROR.separation, PLANE, np.zeros(2), np.ones(2)) == 1.0
-
-
-def test_fields_are_frozen():
-    for value, name in ((stratum_at(CONCAVE, [0.5, 0.5]), "rank"), (MIRROR, "elements")):
-        with pytest.raises(AttributeError):
-            setattr(value, name, None)

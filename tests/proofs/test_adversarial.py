@@ -39,7 +39,6 @@ def test_no_false_theorem_in_a_few_adversarial_problems():
         attempted(trial(CASES[k], rng))
 
 
-@pytest.mark.slow
 def test_no_false_theorem_in_adversarial_problems_of_every_kind():
     for posed in problems(np.random.default_rng(12), MANY * len(CASES)):
         attempted(posed)

@@ -225,7 +225,6 @@ def test_the_pair_is_proved_for_a_range_of_sizes_at_once(corner):
     assert 7.6 < whole[0] < 7.9428181 < whole[1] < 8.3
 
 
-@pytest.mark.slow
 @settings(max_examples=10)
 @given(st.floats(1.45, 1.55), st.floats(15.7, 16.3))
 def test_every_pair_in_the_box_rests_where_its_cell_says(corner, rod, length):

@@ -62,7 +62,6 @@ def test_no_false_theorem_in_some_hundred_problems(kind):
     assert sum(found[word] for word in ("proved", "refuted", "undecided", "refused")) == FEW
 
 
-@pytest.mark.slow
 def test_no_false_theorem_in_hundreds_of_problems_or_thousands():
     totals = {kind: tried(kind, MANY, seed=2) for kind in KINDS}
     sure = totals["minimum"]

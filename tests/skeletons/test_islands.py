@@ -155,7 +155,6 @@ class TestClosedSurfaces:
         assert (counts(atlas), atlas.euler_characteristic) == ((0, 0, 1), 0)
         assert atlas.faces[0].euler_characteristic == 0
 
-    @pytest.mark.slow
     def test_a_double_torus_has_two_handles(self):
         f = (x**2 * (1 - x**2) - y**2) ** 2 + z**2 - sp.Rational(1, 100)
         D = Polyhedron(SPACE, {"pretzel": -f})

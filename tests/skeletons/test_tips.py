@@ -39,7 +39,7 @@ class TestRevolution:
 
     @pytest.mark.parametrize(
         "zeros",
-        [(0.0,), (-0.6, 0.5), pytest.param((-0.7, -0.1, 0.6), marks=pytest.mark.slow)],
+        [(0.0,), (-0.6, 0.5), (-0.7, -0.1, 0.6)],
         ids=["one", "two", "three"],
     )
     @given(turns, turns, st.integers(0, 99))
@@ -66,7 +66,6 @@ class TestRevolution:
         assert (counts(atlas), atlas.euler_characteristic) == ((2, 0, 1), 2)
         assert atlas.faces[0].boundary == ((), ())
 
-    @pytest.mark.slow  # nets that are fine at both sides of the point
     def test_a_torus_pinched_to_a_point(self):
         """A sphere of which two points are one."""
         rho = sp.sqrt(x**2 + y**2)

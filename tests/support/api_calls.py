@@ -20,6 +20,7 @@ from polycorner import (
     sweeps,
 )
 from polycorner.dumbbells import pictures as drum_pictures
+from polycorner.dumbbells import viewer
 
 ORIGIN = [0.0, 0.0]
 
@@ -50,7 +51,7 @@ VALUES = {
     "Crossing": lambda: minimisation.crossing(of.certificate(), "left", "a"),
     "CutDisc": lambda: motion.CutDisc(0.3, 0.1),
     "Cylinder": lambda: bodies.Cylinder(3.0),
-    "Descent": lambda: dumbbells.viewer.descent(of.square(), of.energy(), [0.5, 0.5]),
+    "Descent": lambda: viewer.descent(of.square(), of.energy(), [0.5, 0.5]),
     "Disc": lambda: motion.Disc(0.3),
     "DrumView": lambda: drum_pictures.DrumView(of.run()),
     "DumbbellDrum": of.drum,

@@ -7,6 +7,7 @@ started any.  A test that is not in the file is new or cheap.
 
 import json
 import resource
+import signal
 import sys
 from collections import Counter
 from multiprocessing import util
@@ -29,11 +30,25 @@ def processor_seconds() -> tuple[float, float]:
     return own.ru_utime + own.ru_stime, others.ru_utime + others.ru_stime
 
 
-class Recorder:
-    """Measures each test where it runs, and writes the costs where the reports arrive."""
+def allow_processor_seconds(total: int) -> None:
+    """Have this process, and each that it starts, told when it has used so much, in s."""
+    resource.setrlimit(resource.RLIMIT_CPU, (total, resource.getrlimit(resource.RLIMIT_CPU)[1]))
 
-    def __init__(self, path: Path):
+
+class Cut(BaseException):
+    """A test has used what it may; Hypothesis does not look for a smaller example of this."""
+
+
+class Recorder:
+    """Measures each test where it runs, and writes the costs where the reports arrive.
+
+    A test that uses ``cap`` seconds is cut: it fails, and its cost is a lower bound.
+    """
+
+    def __init__(self, path: Path, cap: int | None = None):
         self.path = path
+        self.cap = cap
+        self.cut = False
         self.seconds: Counter[str] = Counter()
         self.run: set[str] = set()
         self.processes: set[str] = set()
@@ -53,7 +68,15 @@ class Recorder:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logstart(self):
-        self.started, self.last = 0, processor_seconds()
+        self.started, self.last, self.cut = 0, processor_seconds(), False
+        if self.cap is not None:
+            signal.signal(signal.SIGXCPU, self._cut)
+            allow_processor_seconds(int(self.last[0]) + 1 + self.cap)
+
+    def _cut(self, *_):
+        allow_processor_seconds(resource.RLIM_INFINITY)  # for what remains to be torn down
+        self.cut = True
+        raise Cut
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self):
@@ -62,13 +85,14 @@ class Recorder:
         own, others = now[0] - self.last[0], now[1] - self.last[1]
         # A process that an earlier test started may be waited for in this one.
         report.cost = (own + (others if self.started else 0.0), self.started > 0)
+        report.cut = self.cut
         self.last = now
         return report
 
     def pytest_runtest_logreport(self, report):
         seconds, processes = report.cost
         self.seconds[report.nodeid] += seconds
-        if report.when == "call" and not report.skipped:
+        if report.cut or (report.when == "call" and not report.skipped):
             self.run.add(report.nodeid)
         if processes:
             self.processes.add(report.nodeid)

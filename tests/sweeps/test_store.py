@@ -347,7 +347,6 @@ def test_ctrl_c_keeps_what_is_finished_and_says_that_more_is_pending(tmp_path):
     assert len(lines(log)) == 300
 
 
-@pytest.mark.slow
 def test_killed_with_a_pool_no_worker_is_left_and_few_points_are_lost(tmp_path):
     store, log = tmp_path / "s", tmp_path / "log"
     with process(store, log, workers=2) as running:

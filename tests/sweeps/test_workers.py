@@ -109,7 +109,6 @@ def test_a_point_that_kills_its_workers_is_a_row_and_the_others_are_there(monkey
     assert np.nansum(found["x"]) == sum(range(40)) - 17
 
 
-@pytest.mark.slow
 def test_processes_that_die_are_replaced():
     found = sweep(sweep_functions.deadly, {"a": range(3), "b": range(4)}, executor=2)
     failed = np.argwhere(found["status"].values == 2).tolist()

@@ -23,10 +23,7 @@ PAIRS = {
 }
 
 
-PLANE_FIRST = [a if a == ("--plane",) else pytest.param(a, marks=pytest.mark.slow) for a in PAIRS]
-
-
-@pytest.mark.parametrize("arguments", PLANE_FIRST, ids=" ".join)
+@pytest.mark.parametrize("arguments", PAIRS, ids=" ".join)
 def test_pair_is_the_librarys(arguments):
     pair, heading = PAIRS[arguments]
     found = answer("dyad", *arguments)
@@ -46,7 +43,7 @@ def test_pair_is_the_librarys(arguments):
     assert found["parameters"]["length"] == pair.length
 
 
-@pytest.mark.parametrize("arguments", PLANE_FIRST, ids=" ".join)
+@pytest.mark.parametrize("arguments", PAIRS, ids=" ".join)
 def test_pair_follows_from_its_own_points(arguments):
     """Gaps by minimisation and their differences say what is active, of which rank."""
     pair, heading = PAIRS[arguments]

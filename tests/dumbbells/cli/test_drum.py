@@ -278,7 +278,6 @@ main()
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
 def test_a_stopped_run_goes_on(capsys, tmp_path, how):
     """Ctrl-C is answered with what was done; a killed process leaves its last saving."""

@@ -1,8 +1,10 @@
 """Driven pairs: chirality against the model's, mirror images, strata, and the minimiser."""
 
 import math
+import statistics
 from dataclasses import replace
 
+import api_samples
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,6 +18,7 @@ from polycorner.dumbbells.dynamics.dyads import (
     minimiser_heading,
 )
 from polycorner.dumbbells.dynamics.pairs import is_dyad
+from polycorner.dumbbells.dynamics.singles import Mean
 from polycorner.dumbbells.dynamics.steady import correlation_time, steady
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.minima import dyad_minima
@@ -132,6 +135,15 @@ def test_means_are_over_pairs_that_held():
     assert found.minimiser == pytest.approx(dyad_minima(PAIR)[0].headings[0], abs=1e-6)
     with pytest.raises(ValueError, match="after: expected a time before the end"):
         steady(paths, after=3.0)
+
+
+@pytest.mark.parametrize(("errors", "settled"), [(0.0, True), (1.9, True), (2.1, False)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_heading_has_settled_that_drifts_by_at_most_two_standard_errors(errors, settled, sign):
+    apart = [-1.0, 0.25, 0.75, 0.5, -0.5]  # of five pairs, with the mean zero
+    error = statistics.stdev(apart) / math.sqrt(len(apart))
+    drift = Mean.of(np.add(apart, sign * errors * error))
+    assert replace(api_samples.steady(), drift=drift).settled == settled
 
 
 def test_arguments_are_checked():

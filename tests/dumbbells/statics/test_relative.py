@@ -69,7 +69,6 @@ def test_rods_that_can_lie_across_each_other_are_refused():
     assert RelativePlacements(DumbbellPair(12.5, 3.0, 0.05)).pair.is_plane
 
 
-@pytest.mark.slow
 def test_the_nested_corners_and_the_line_are_all_local_minima(model):
     """The paper's claim on local minima, proved for its sizes in the plane and in the drum."""
     found = stationary_points(

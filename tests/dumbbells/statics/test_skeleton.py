@@ -165,7 +165,7 @@ class TestTopology:
         assert all(face.closed and len(face.boundary) == 1 for face in found.faces)
         assert corners - edges + faces == found.euler_characteristic == 0
 
-    @pytest.mark.parametrize("heading", [math.pi / 4, pytest.param(2.0, marks=pytest.mark.slow)])
+    @pytest.mark.parametrize("heading", [math.pi / 4, 2.0])
     def test_on_other_sections_too(self, heading):
         found = pair_atlas(DumbbellPair(16, 3, 1.5, 40), heading=heading)
         assert found.skeleton.euler_characteristic == 0

@@ -177,7 +177,6 @@ def test_half_v_holds_longer_than_u_near_the_corner_but_not_far_from_it():
     assert (near[:3] > 2 * bare[:, 0]).all()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("hold", [HOLDS[0], HOLDS[1], HOLDS[3]], ids=lambda hold: hold.direction)
 def test_simulated_times(hold):
     shaking = Agitation(2e-3, 5.0)

@@ -22,7 +22,6 @@ print(*minimise(Polyhedron(M, {"bowl": y - x**2, "lid": 2 - y}), x + y, [1.0, 1.
 """
 
 
-@pytest.mark.slow
 def test_a_changed_stage_is_compiled_again(tmp_path):
     package = tmp_path / "source" / "polycorner"
     shutil.copytree(

@@ -45,7 +45,6 @@ def square(count):
     return Polyhedron(M, parts), -m
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("count", DISTANCES)
 def test_densest_packings_in_a_square_are_certified(count):
     D, E = square(count)

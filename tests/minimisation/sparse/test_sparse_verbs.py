@@ -72,7 +72,7 @@ def catenary(count):
     return np.cumsum(links, axis=0)[:-1], tension
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [100, 1000])
 def test_a_cable_hangs_as_statics_has_it(count, request):
     if count < 1000:
         request.getfixturevalue("everything_sparse")

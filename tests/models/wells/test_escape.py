@@ -50,7 +50,6 @@ def least_action(well, steps=160):
     return best
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", [HALF_U, HALF_V])
 @pytest.mark.parametrize("drag", [0.0, 0.7, 3.0])
 def test_barrier_is_the_least_action(kind, drag):

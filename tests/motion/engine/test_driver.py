@@ -107,7 +107,6 @@ print(simulate(ball, ball.state([1.0]), 2.0, 1e-2).q.tobytes().hex())
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("shipped", ["", SHIPPED[ANY].head + "words of another version"])
 def test_without_it_numba_makes_the_same_engine(tmp_path, shipped):
     """The file may be missing, and another version of LLVM may not understand it."""

@@ -2,7 +2,6 @@
 
 import cvxpy as cp
 import numpy as np
-import pytest
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
@@ -75,7 +74,6 @@ def least_motion(engine, before):
     return most.value / max(speeds)
 
 
-@pytest.mark.slow
 def test_a_pile_remains_at_rest_as_long_as_it_can():
     """Carried up by the drum, it slides when forces can no longer balance, and not before.
 

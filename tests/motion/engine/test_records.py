@@ -4,8 +4,6 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 RUN = """
 import sys
 import numpy as np
@@ -29,7 +27,6 @@ print(engine.motion.q.tobytes().hex())
 """
 
 
-@pytest.mark.slow
 def test_no_index_is_below_zero(tmp_path):
     """It would be so far off that the process ends; with true lengths it would wrap around."""
     found = []

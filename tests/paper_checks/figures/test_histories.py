@@ -10,7 +10,6 @@ from paper_checks.figures import FIGURES
 from paper_checks.figures import style as look
 
 
-@pytest.mark.slow
 def test_the_single_dumbbell_zigzags_and_loses_its_heading(drawn):
     a, b, c, d, e = drawn("single_history").axes
     calm = [lines(axes, look.RIGHT[1])[0] for axes in (a, b, c)]
@@ -33,7 +32,6 @@ def test_the_single_dumbbell_zigzags_and_loses_its_heading(drawn):
     assert f"{heading[-1]:+.1f}°".replace("-", "−") in FIGURES["single_history"].caption
 
 
-@pytest.mark.slow
 def test_dyads_turn_to_the_side_of_their_hand(drawn):
     panels = drawn("dyad_history").axes
     b, c, d, e, f = panels[3:]

@@ -172,12 +172,7 @@ def test_a_turned_corner_of_the_plane_is_the_rotated_pair():
         (strata_dimensions.lowest_dimension_is, (4,), Verdict.REFUTED),
         (strata_counts.kinds_are, ((2, 5, 4),), Verdict.HOLDS),
         (strata_counts.kinds_are, ((2, 3, 4),), Verdict.CORRECTED),
-        pytest.param(
-            strata_counts.corners_fall_into,
-            (("Delta_L", "Delta_R"),),
-            Verdict.REFUTED,
-            marks=pytest.mark.slow,
-        ),
+        (strata_counts.corners_fall_into, (("Delta_L", "Delta_R"),), Verdict.REFUTED),
         (strata_counts.components_are, (3, 4), Verdict.HOLDS),
         (strata_counts.components_are, (3, 2), Verdict.CORRECTED),
         (strata_counts.half_motions_are, ((4, 4),), Verdict.REFUTED),

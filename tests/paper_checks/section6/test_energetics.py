@@ -78,7 +78,6 @@ def test_a_heading_that_is_right_in_the_drum_only_nearly_is_not_called_exact():
     assert corner.heading_is(shifted).verdict is Verdict.CORRECTED
 
 
-@pytest.mark.slow
 def test_each_way_of_missing_a_rest_locus_is_noticed():
     for named in (frozenset({"G"}), energetics.NAMED | {"crossed"}):
         assert energetics.only_loci(named, energetics.OTHERS[:1]).verdict is Verdict.REFUTED
@@ -98,7 +97,6 @@ def test_without_names_there_is_one_component_each():
     assert energetics.half_lines(components=1, ordered=False).verdict is Verdict.HOLDS
 
 
-@pytest.mark.slow
 def test_a_limit_below_the_critical_one_holds_and_one_above_does_not():
     critical = energetics.critical_formula()
     assert energetics.minimum_below(critical * 0.99).verdict is Verdict.HOLDS

@@ -273,7 +273,6 @@ def test_clusters_of_three_spheres():
     assert np.allclose(points(found), [[1, 0.5, -math.sqrt(0.75)], [1, 0.5, math.sqrt(0.75)]])
 
 
-@pytest.mark.slow
 def test_clusters_of_four_spheres():
     """The tetrahedron and its mirror image are all clusters in which all six pairs touch."""
     space = Manifold.euclidean("a b c x y z")

@@ -106,7 +106,6 @@ def test_three_discs_on_the_square_torus(least):
     assert found.minima[0].point[-1] == pytest.approx(LARGEST)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("least", [0.2575, 0.252])
 def test_four_discs_on_the_square_torus(least):
     """The densest ones are the only critical ones with a larger radius.

@@ -61,7 +61,6 @@ def test_minima_of_a_product_of_waves_are_counted_by_its_factors(lattice):
     assert len(found.minima) == count_of_minima(3)
 
 
-@pytest.mark.slow
 def test_shubert_has_760_minima_and_one_in_a_corner():
     found = stationary_points(walls(10), shubert(X) * shubert(Y), box=[(-10, 10)] * 2)
     assert found.complete

@@ -145,7 +145,6 @@ def of_shubert(side):
     ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("side", "inner", "all_"), [(2, 24, 33), (10, 722, 761)])
 def test_minima_of_shuberts_function(side, inner, all_):
     """The count of 760 in the literature is neither that of the open square nor of the closed."""
