@@ -99,7 +99,7 @@ def prove(
             given, proof = _judged(problem, name, digits, sides, minimise, progress)
         rows.append({"point": name, "given": given, **_answer(problem, proof)})
         sheets.append(_sheet(name, given, problem, proof))
-        if out is not None and proof.proved and hasattr(proof, "save"):
+        if out is not None and proof.proved:
             written += _saved(proof, out / f"{name}.zip", rows[-1])
     answer = {"problem": str(file), "title": problem.title, "proofs": rows}
 
@@ -114,19 +114,12 @@ def membership(problem: "ProblemFile", name: str) -> dict[str, Any]:
 
     ``inside`` is null where that is not decided; ``violated`` has values, as texts, by name.
     """
-    import polycorner
+    from polycorner import exact_point
 
-    exact_point = getattr(polycorner, "exact_point", None)
-    if exact_point is not None:
-        found = exact_point(problem.polyhedron, problem.exact[name], problem.energy)
-        violated = {v.name: list(v.value) for v in found.violations}
-        energy = None if found.energy is None else list(found.energy)
-        return {"inside": found.inside, "violated": violated, "near": energy}
-    d, q = problem.polyhedron, problem.points[name]
-    values = [*zip(d.names, d.values(q).tolist(), strict=True)]
-    off = zip(d.equation_names, d.equation_values(q).tolist(), strict=True)
-    violated = {n: [repr(x)] for n, x in values if x < 0} | {n: [repr(x)] for n, x in off if x}
-    return {"inside": None, "violated": violated, "near": None}
+    found = exact_point(problem.polyhedron, problem.exact[name], problem.energy)
+    violated = {v.name: list(v.value) for v in found.violations}
+    energy = None if found.energy is None else list(found.energy)
+    return {"inside": found.inside, "violated": violated, "near": energy}
 
 
 def _chosen(problem: "ProblemFile", chosen: Sequence[str], file: Path) -> list[str]:
@@ -184,7 +177,7 @@ def _answer(problem: "ProblemFile", proof: "Proof") -> dict[str, Any]:
         "modulo": list(proof.symmetry),
         "digits": proof.digits,
         "enclosures": {name: list(sides) for name, sides in proof.enclosures.items()},
-        "rattlers": {name: list(proof.enclosures[name]) for name in _rattling(proof)},
+        "rattlers": {name: list(sides) for name, sides in proof.room.items()},
         "alone": {name: list(sides) for name, sides in proof.box.items()},
     }
     if problem.maximised and energy is not None:  # the bounds of the negative, exchanged
@@ -198,13 +191,6 @@ def _answer(problem: "ProblemFile", proof: "Proof") -> dict[str, Any]:
 
 def _negative(decimals: str) -> str:
     return decimals.removeprefix("-") if decimals.startswith("-") else f"-{decimals}"
-
-
-def _rattling(proof: "Proof") -> list[str]:
-    if proof.minimum is None:
-        return []
-    names = proof.certificate.problem.polyhedron.manifold.names
-    return [names[j] for j in proof.minimum.rattling]
 
 
 def _sheet(name: str, given: dict[str, Any], problem: "ProblemFile", proof: "Proof") -> "Sheet":
@@ -233,7 +219,7 @@ def _saved(proof: "Proof", path: Path, row: dict[str, Any]) -> list[Path]:
     """Save a proof for the checker, or note why there is no file of it."""
     with writing(path):
         try:
-            saved = [Path(proof.save(path))]  # type: ignore[attr-defined]
+            saved = [Path(proof.save(path))]
         except ValueError as error:
             row["not_saved"] = str(error)
             remark(f"{path.name} is not written: {error}")
