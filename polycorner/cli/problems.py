@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 STARTS = 60  # random points from which a search for corners descends, beside those of the file
 MOST_DIGITS = 10_000
-FILE = "examples/circles_in_square.toml"
+FILE = "examples/problems/circles_in_square.toml"
 
 
 def with_problem(function: Callable[..., Any]) -> Callable[..., Any]:

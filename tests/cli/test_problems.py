@@ -13,7 +13,7 @@ from polycorner.files import save_problem
 from polycorner.models import Tutorial
 from polycorner.proofs import stationary_points
 
-CIRCLES = str(Path(__file__).parents[2] / "examples" / "circles_in_square.toml")
+CIRCLES = str(Path(__file__).parents[2] / "examples" / "problems/circles_in_square.toml")
 BOWL = """
 coordinates = [{ names = "(x, y)", box = [-2, 2] }]
 energy.minimise = "t*x + y"
