@@ -11,10 +11,19 @@ import pytest
 import sympy as sp
 
 import polycorner
-from polycorner import Manifold, Polyhedron, SmoothFunction, certify, minima, minimise, prove
+from polycorner import (
+    Manifold,
+    Polyhedron,
+    SmoothFunction,
+    certify,
+    exact_point,
+    minima,
+    minimise,
+    prove,
+)
 from polycorner.bodies import Arrangement, disc
 from polycorner.dumbbells.viewer import descent
-from polycorner.files import load_certificate, save_certificate
+from polycorner.files import load_certificate, save_certificate, save_problem
 from polycorner.formulas.families import Family
 from polycorner.minimisation import stationary_on
 from polycorner.motion import (
@@ -74,6 +83,8 @@ CASES = {
     ),
     "nerve.height": ("height", lambda e, _: nerve(FLAT, e)),
     "certify.energy": ("energy", lambda e, _: certify(D, e, [1.0, 1.0])),
+    "exact_point.energy": ("energy", lambda e, _: exact_point(D, [1.0, 1.0], e)),
+    "save_problem.energy": ("energy", lambda e, folder: save_problem(folder / "p.toml", D, e)),
     "minimise.energy": ("energy", lambda e, _: minimise(D, e, [1.0, 1.0])),
     "minima.energy": ("energy", lambda e, _: minima(D, e, starts=[[1.0, 1.0]])),
     "stationary_on.energy": ("energy", lambda e, _: stationary_on(D, e, [1.0, 1.0], ["right"])),
@@ -178,7 +189,7 @@ ALLOWED = {
     "N()": set(),
     "nsimplify": {"motion/rotations.py"},  # of doubles
     # Of expressions that have a compiled form in known symbols.
-    "lambdify": {"formulas/expressions.py", "formulas/signs.py"},
+    "lambdify": {"formulas/periodicity.py"},
     "eval": {"kinds.py"},  # of annotations in the package's own source
     "exec": set(),
     # Of what this process, or the one that started it, has pickled.

@@ -158,6 +158,13 @@ def new(name):
 
 
 @cache
+def problem_file():
+    from polycorner import files
+
+    return files.save_problem(new("problem.toml"), square(), energy())
+
+
+@cache
 def study_file():
     path = new("study.toml")
     path.write_text('study = "area"\n[axes.size]\nvalues = [1.0]\n')
