@@ -33,10 +33,12 @@ It is a statement in one chart: coordinates of circles are taken as real numbers
 """
 
 import math
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import fsum
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from polycorner import checks
@@ -74,9 +76,6 @@ from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.values import Checked
 
 if TYPE_CHECKING:
-    import os
-    from pathlib import Path
-
     import sympy
 
 DOUBLE_DIGITS = 17  # of a floating-point number, which bounds over a box of parameters are
@@ -253,7 +252,8 @@ class Proof(Checked, Printed):
         digits = min(self.digits, DOUBLE_DIGITS) if self.cells else self.digits
         return decimals(min(found), max(found), digits)
 
-    def save(self, path: "str | os.PathLike[str]") -> "Path":
+    @checked
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Save what is proved, with its evidence, for an independent checker; return the path.
 
         The checker is run first.  It does less algebra than :func:`prove`: where it does not follow
