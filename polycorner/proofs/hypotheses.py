@@ -424,6 +424,23 @@ def _curved_on_cone(solved: Solved, outside: list[int]) -> ConditionResult:
     return undecided(f"not shown to be positive where {', '.join(weak)} do not decrease")
 
 
+def closed_on(claim: Claim, enclosure: Enclosure) -> list[int]:
+    """Return the functions that are not held and may vanish, for some parameters of a cell.
+
+    The cell is divided until they do not, as in :func:`inside`.
+    """
+    waiting, found = [(tuple(enclosure.predictor.cell.reach), 0)], set[int]()
+    while waiting:
+        reach, depth = waiting.pop()
+        values = claim.system.formulas.values(enclosure.neighbourhood(reach), claim.others)
+        some = {i for i, x in zip(claim.others, values, strict=True) if not (x > 0 or x < 0)}
+        if some and reach and depth < MOST_HALVINGS:
+            waiting += [(half, depth + 1) for half in _halves(reach)]
+        else:
+            found |= some
+    return sorted(found)
+
+
 def of_a_choice(
     claim: Claim, closed: Sequence[int], found: Mapping[str, ConditionResult]
 ) -> Mapping[str, ConditionResult]:

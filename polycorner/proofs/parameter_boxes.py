@@ -32,6 +32,7 @@ from polycorner.proofs.hypotheses import (
     ConditionResult,
     Status,
     check_hypotheses,
+    closed_on,
     of_a_choice,
     without_enclosure,
 )
@@ -151,9 +152,9 @@ def _tried(
         cell = _cell(sides, without_enclosure(enclosure, symmetric=bool(claim.fields)), {})
     else:
         found = check_hypotheses(claim, enclosure)
-        values = claim.system.formulas.values(enclosure.neighbourhood(), claim.others)
-        closed = [i for i, x in zip(claim.others, values, strict=True) if not (x > 0 or x < 0)]
+        refuted = any(x.status is Status.FAILED for k, x in found.items() if k != INACTIVE)
         # A function that is negative throughout refutes the claim, whatever supports.
+        closed = closed_on(claim, enclosure) if refuted else []
         kept = {**of_a_choice(claim, closed, found), INACTIVE: found[INACTIVE]}
         cell = _cell(sides, kept, _bounds(claim, enclosure))
     if cell.status is not Status.UNDECIDED:
