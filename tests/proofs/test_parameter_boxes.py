@@ -258,7 +258,7 @@ def _cached(corner):
 
 
 def test_thick_rods_are_refuted_where_a_contact_pulls(corner):
-    p = prove(corner, parameters={"t": (2.885, 2.9)}, max_cells=10)
+    p = prove(corner, parameters={"t": (2.885, 2.9)}, max_cells=20)
     status = {cell.parameters["t"]: cell.status for cell in p.cells}
     for (low, up), found in status.items():
         for rod in (low, up):
