@@ -12,7 +12,7 @@ from polycorner import checks
 from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.proofs.growth import Point
-from polycorner.proofs.membership import Membership, Place
+from polycorner.proofs.membership import Membership, Signs
 from polycorner.proofs.repairs import Repair
 from polycorner.spaces.manifold import Manifold
 from polycorner.tolerances import DEFAULT
@@ -83,7 +83,7 @@ def exact_point(
     reach = Fraction(checks.real("within", within, above=0))
     digits = checks.whole("digits", digits, least=1, most=MOST_DIGITS)
     problem = pose(polyhedron, _nothing() if energy is None else energy)
-    place = Place(problem, int(digits * BITS_PER_DIGIT) + GUARD_BITS)
+    place = Signs(problem, int(digits * BITS_PER_DIGIT) + GUARD_BITS)
     return _judged(Repair(place, given, reach, digits, costly=energy is not None), digits)
 
 

@@ -6,7 +6,7 @@ energy, as one straight-line program with exact constants; the set as a union of
 the evidence.  Numbers are exact, rational ones as texts.  What follows from them is not stored.
 
 ``strict minimum``
-    what a :class:`Face` holds.
+    what a :class:`ProvedFace` holds.
 ``box of parameters``
     the same, with a tree of splits of the box, each node before its halves, and a start in each
     cell.
@@ -129,7 +129,7 @@ def period(value: float) -> str | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Face(Value):
+class ProvedFace(Value):
     """A point that solves the KKT equations of a face, and the symmetries modulo which it is one.
 
     Attributes
@@ -147,14 +147,14 @@ class Face(Value):
 
 
 def save_face(
-    path: str | os.PathLike[str], problem: Problem, formulas: Formulas, face: Face, bits: int
+    path: str | os.PathLike[str], problem: Problem, formulas: Formulas, face: ProvedFace, bits: int
 ) -> Path:
     """Save a strict minimum."""
     evidence = _of_face(problem, face, bits) | {"centre": texts(face.centre)}
     return _save(path, STRICT, problem, formulas, face.gauges, evidence)
 
 
-def _of_face(problem: Problem, face: Face, bits: int) -> dict[str, Any]:
+def _of_face(problem: Problem, face: ProvedFace, bits: int) -> dict[str, Any]:
     m = problem.inequalities
     return {
         "bits": bits,
@@ -168,7 +168,7 @@ def save_cells(
     path: str | os.PathLike[str],
     problem: Problem,
     formulas: Formulas,
-    face: Face,
+    face: ProvedFace,
     sides: Mapping[str, Interval],
     cells: Sequence[ParameterCell],
     bits: int,

@@ -169,7 +169,7 @@ def _middle(sides: tuple[str, str]) -> str:
     return decimals(middle, middle, SHOWN_DIGITS)[0]
 
 
-class Place:
+class Signs:
     """A polyhedron and an energy about a point: signs, enclosures and refutations.
 
     Parameters
@@ -309,20 +309,20 @@ class Place:
 
     # ------------------------------------------------------------------------------- empty boxes
 
-    def part(self, sides: Sequence[Bounds]) -> "Part":
+    def part(self, sides: Sequence[Bounds]) -> "BoxPart":
         """Return what enclosures say of a box; the working precision is set by the caller."""
         centre = [ball((low + high) / 2) for low, high in sides]
         halves = [ball((high - low) / 2) for low, high in sides]
         hull = [c + ball(0, 1) * r for c, r in zip(centre, halves, strict=True)]
         values = self.formulas.values(Box(hull), self.rows)
-        return Part(self, centre, halves, Box(hull), values)
+        return BoxPart(self, centre, halves, Box(hull), values)
 
 
 @dataclass(frozen=True, eq=False)
-class Part(Value):
+class BoxPart(Value):
     """A box, and the values of all functions on it."""
 
-    place: Place
+    place: Signs
     centre: "list[Ball]"
     halves: "list[Ball]"
     box: Box

@@ -20,7 +20,7 @@ from polycorner.polyhedra.cones import independent_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.growth import Point
-from polycorner.proofs.membership import Bounds, Part, Place, Violation
+from polycorner.proofs.membership import Bounds, BoxPart, Signs, Violation
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
@@ -99,7 +99,7 @@ class Repair:
 
     Parameters
     ----------
-    place : Place
+    place : Signs
         The set and the energy.
     given : tuple of Fraction
         The given point.
@@ -112,7 +112,7 @@ class Repair:
     """
 
     def __init__(
-        self, place: Place, given: Point, within: Fraction, digits: int, *, costly: bool
+        self, place: Signs, given: Point, within: Fraction, digits: int, *, costly: bool
     ) -> None:
         self.place, self.given, self.within, self.costly = place, given, within, costly
         self.steps = MOST_STEPS + digits // DIGITS_A_STEP
@@ -355,7 +355,7 @@ class Repair:
             waiting += [[*box[:j], half, *box[j + 1 :]] for half in halves]
         return ()
 
-    def _refuted(self, part: Part, rows: list[int]) -> list[int] | int:
+    def _refuted(self, part: BoxPart, rows: list[int]) -> list[int] | int:
         """Return functions that do not hold together in a box, or where to divide it."""
         one = part.violated(rows)
         if one is not None:

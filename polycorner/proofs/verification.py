@@ -54,7 +54,7 @@ from polycorner.progress import Progress, silent
 from polycorner.proofs.attempt import Attempt, Posed, attempt, bits_for, pose_claim
 from polycorner.proofs.bounded import SUBJECT, BoundedMinimum
 from polycorner.proofs.bounded_search import SIMPLE, bounded_minimum
-from polycorner.proofs.files import Face, UncheckedError, save_cells, save_face, save_minimum
+from polycorner.proofs.files import ProvedFace, UncheckedError, save_cells, save_face, save_minimum
 from polycorner.proofs.growth import Gauge
 from polycorner.proofs.hypotheses import SYMMETRIC, ConditionResult, Status
 from polycorner.proofs.invariance import Generator, generators
@@ -137,7 +137,7 @@ class Proof(Checked, Printed):
         floating-point coordinates are, and equations that do not vanish there, with their values;
         empty where it lies in the set.  What is proved concerns a point beside it;
         :func:`~polycorner.proofs.exact_point` repairs such points.
-    face : Face or None
+    face : ProvedFace or None
         What the first statement is saved with.
     """
 
@@ -155,7 +155,7 @@ class Proof(Checked, Printed):
     minimum: BoundedMinimum | None = field(default=None, repr=False)
     room: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     outside: Mapping[str, str] = field(default_factory=dict, repr=False)
-    face: Face | None = field(default=None, repr=False)
+    face: ProvedFace | None = field(default=None, repr=False)
 
     @property
     def statement(self) -> str:
@@ -537,7 +537,7 @@ def _one(certificate: Certificate, tried: Attempt, digits: int) -> Proof:
     )
 
 
-def _face(posed: Posed, sides: Sequence[Bounds]) -> Face:
+def _face(posed: Posed, sides: Sequence[Bounds]) -> ProvedFace:
     """Return a face and its point: the simplest numbers, where they may be the coordinates."""
     system = posed.claim.system
     middle = [(lower + upper) / 2 for lower, upper in sides]
@@ -545,7 +545,7 @@ def _face(posed: Posed, sides: Sequence[Bounds]) -> Face:
     exactly = all(a <= x <= b for x, (a, b) in zip(simple, sides, strict=True))
     normals = ([Fraction(x) for x in gauge] for gauge in system.gauges)
     gauges = [Gauge(f, tuple(n)) for f, n in zip(posed.claim.fields, normals, strict=True)]
-    return Face(system.held, tuple(simple if exactly else middle), tuple(gauges))
+    return ProvedFace(system.held, tuple(simple if exactly else middle), tuple(gauges))
 
 
 def _bounded(

@@ -15,7 +15,15 @@ from polycorner import checks
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.rows import Indices
 from polycorner.kinds import checked
-from polycorner.models.packings.regions import AXES, Box, Region, Torus, pair_gap, radius, region_of
+from polycorner.models.packings.regions import (
+    AXES,
+    BoxContainer,
+    Container,
+    TorusContainer,
+    pair_gap,
+    radius,
+    region_of,
+)
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
@@ -33,7 +41,7 @@ class Balls(Checked):
     equal: bool
 
     @property
-    def area(self) -> Region:
+    def area(self) -> Container:
         """The region as a value."""
         raise NotImplementedError
 
@@ -194,9 +202,9 @@ class Balls(Checked):
         """Rotations of the disc and translations of the torus, as vector fields."""
         pairs = [(f"x{i}", f"y{i}") for i in range(1, self.count + 1)]
         x = dict(zip(self.manifold.names, self.manifold.symbols, strict=True))
-        if isinstance(self.area, Torus):
+        if isinstance(self.area, TorusContainer):
             return Symmetry(fields=[{pair[k]: 1 for pair in pairs} for k in range(2)])
-        if isinstance(self.area, Box):
+        if isinstance(self.area, BoxContainer):
             return Symmetry()
         turn = {a: -x[b] for a, b in pairs} | {b: x[a] for a, b in pairs}
         return Symmetry(fields=[turn])
@@ -252,7 +260,7 @@ class CirclesIn(Balls):
         region_of("region", self.region)
 
     @cached_property
-    def area(self) -> Region:
+    def area(self) -> Container:
         """The region as a value."""
         return region_of("region", self.region)
 
@@ -277,12 +285,12 @@ class SpheresInCube(Balls):
         checks.flag("equal", self.equal)
 
     @cached_property
-    def area(self) -> Region:
+    def area(self) -> Container:
         """The unit cube as a value."""
-        return Box((Fraction(1),) * 3)
+        return BoxContainer((Fraction(1),) * 3)
 
 
-def shaken(centres: Array, area: Region, rng: np.random.Generator, length: float) -> Array:
+def shaken(centres: Array, area: Container, rng: np.random.Generator, length: float) -> Array:
     """Return centres of which the neighbours of a random point are moved far."""
     near = np.argsort(area.apart(centres, area.scattered(rng, 1))[:, 0])
     some = near[: rng.integers(2, max(3, len(centres) // 3) + 1)]
@@ -291,7 +299,7 @@ def shaken(centres: Array, area: Region, rng: np.random.Generator, length: float
     return moved
 
 
-def refilled(centres: Array, radii: Array, area: Region, rng: np.random.Generator) -> Array:
+def refilled(centres: Array, radii: Array, area: Container, rng: np.random.Generator) -> Array:
     """Return centres of which one or two lie in holes, wide ones more often.
 
     They are any, or one of the three smallest.

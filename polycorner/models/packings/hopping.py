@@ -103,7 +103,7 @@ class BasinHopping(Checked):
         )
 
 
-class Descent:
+class CornerDescent:
     """Descents on one model, in scale units."""
 
     def __init__(self, model: Hopped) -> None:
@@ -250,7 +250,7 @@ class _Search:
 
     def __init__(self, model: Any, rng: np.random.Generator, patience: int) -> None:
         self.model, self.rng, self.patience = model, rng, patience
-        self.descent = Descent(model)
+        self.descent = CornerDescent(model)
         self.hops = self.found_after = self.since = 0
         self.current: Array | None = None
         self.best: Array | None = None

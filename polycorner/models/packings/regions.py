@@ -30,7 +30,7 @@ KINDS = "'square', 'circle', 'torus', 'hexagonal torus', (width, height) or two 
 Wall = tuple[Family, str, str, tuple[float, ...], str]
 
 
-class Region(ABC):
+class Container(ABC):
     """Where the centres of balls may be, and how far they are from one another and the walls."""
 
     dimension: int
@@ -82,7 +82,7 @@ class Region(ABC):
 
 
 @dataclass(frozen=True)
-class Box(Region):
+class BoxContainer(Container):
     """``0 <= x_k <= sides[k]``."""
 
     sides: tuple[Fraction, ...]
@@ -126,7 +126,7 @@ class Box(Region):
 
 
 @dataclass(frozen=True)
-class Disc(Region):
+class DiscContainer(Container):
     """The unit disc about the origin."""
 
     dimension = 2
@@ -155,7 +155,7 @@ class Disc(Region):
 
 
 @dataclass(frozen=True)
-class Torus(Region):
+class TorusContainer(Container):
     """``R^2/L`` in lattice coordinates; ``gram`` has ``|a|^2, a.b, |b|^2`` of a reduced basis."""
 
     gram: tuple[Fraction, Fraction, Fraction]
@@ -225,14 +225,14 @@ class Torus(Region):
         return np.asarray(points @ np.linalg.inv(self.basis))
 
 
-def region_of(argument: str, given: Any) -> Region:
+def region_of(argument: str, given: Any) -> Container:
     """Return the region of a word, of two sides or of two lattice vectors, or raise."""
     one = Fraction(1)
-    words: dict[str, Region] = {
-        "square": Box((one, one)),
-        "circle": Disc(),
-        "torus": Torus((one, Fraction(0), one)),
-        "hexagonal torus": Torus((one, one / 2, one)),
+    words: dict[str, Container] = {
+        "square": BoxContainer((one, one)),
+        "circle": DiscContainer(),
+        "torus": TorusContainer((one, Fraction(0), one)),
+        "hexagonal torus": TorusContainer((one, one / 2, one)),
     }
     if isinstance(given, str):
         if given not in words:
@@ -245,10 +245,10 @@ def region_of(argument: str, given: Any) -> Region:
     sides = tuple([_exact(argument, side) for side in given])
     if min(sides) <= 0:
         refuse(argument, "positive sides", given)
-    return Box(sides)
+    return BoxContainer(sides)
 
 
-def _lattice(argument: str, given: Any) -> Torus:
+def _lattice(argument: str, given: Any) -> TorusContainer:
     if any(not isinstance(vector, tuple | list) or len(vector) != 2 for vector in given):
         refuse(argument, KINDS, given)
     a, b = ([_exact(argument, x) for x in vector] for vector in given)
@@ -260,7 +260,7 @@ def _lattice(argument: str, given: Any) -> Torus:
             "square of either: a reduced basis",
             given,
         )
-    return Torus((aa, ab, bb), float(np.arctan2(float(a[1]), float(a[0]))))
+    return TorusContainer((aa, ab, bb), float(np.arctan2(float(a[1]), float(a[0]))))
 
 
 def _exact(argument: str, number: Any) -> Fraction:
@@ -288,7 +288,7 @@ def family(
 
 
 @lru_cache(maxsize=128)
-def pair_gap(region: Region, shared: bool) -> Family:
+def pair_gap(region: Container, shared: bool) -> Family:
     """Return ``|x_2 - x_1 + v|^2 - (r_1 + r_2)^2``; balls share a radius, or have their own."""
     axes = AXES[: region.dimension]
     centres = [f"{axis}{k}" for k in (1, 2) for axis in axes]
@@ -330,7 +330,7 @@ def symbols(names: str) -> "tuple[sympy.Symbol, ...]":
     return tuple(sympy.Symbol(name, real=True) for name in names.split())
 
 
-def _pair_formula(region: Region, radii: tuple[str, ...]) -> "Formulas":
+def _pair_formula(region: Container, radii: tuple[str, ...]) -> "Formulas":
     axes = AXES[: region.dimension]
     one, two = (symbols(" ".join(f"{axis}{k}" for axis in axes)) for k in (1, 2))
     image = symbols(" ".join(region.parameters)) or (0,) * len(axes)
@@ -363,4 +363,4 @@ def _most_formula() -> "Formulas":
 
 def _own_formula(gram: tuple[Fraction, Fraction, Fraction]) -> "Formulas":
     r, p, q = symbols("r p q")
-    return {}, {"own": Torus(gram).square([p, q]) - 4 * r**2}
+    return {}, {"own": TorusContainer(gram).square([p, q]) - 4 * r**2}

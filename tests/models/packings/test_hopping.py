@@ -7,7 +7,7 @@ import pytest
 
 from polycorner.container import FileError
 from polycorner.models import CirclesIn, PointsOnSphere, basin_hopping
-from polycorner.models.packings.hopping import SEARCHES, Descent
+from polycorner.models.packings.hopping import SEARCHES, CornerDescent
 from polycorner.searches import Ending
 
 MODEL = CirclesIn("square", 7)
@@ -67,7 +67,7 @@ def test_bodies_that_rattle_end_in_the_middle_of_their_room():
     ids=["sum", "sphere"],
 )
 def test_the_slope_of_soft_functions_is_that_of_their_value(model):
-    descent, rng = Descent(model), np.random.default_rng(2)
+    descent, rng = CornerDescent(model), np.random.default_rng(2)
     q = model.starts(rng, 1)[0]
     weights, stiffness = rng.random(descent.rows.count) + 0.5, 3.0
     u = q / descent.scales + 0.1 * rng.standard_normal(len(q))
