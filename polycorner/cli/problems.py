@@ -1,6 +1,7 @@
 """Commands on a problem in a file: ``polycorner prove FILE.toml``, and so on."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
     from polycorner.printing import Sheet
     from polycorner.proofs import Proof
 
-STARTS = 60  # random points from which a search for corners descends, beside those of the file
+STARTS = 60  # points from which a search for corners descends
+DRAWN = 20  # times as many random points, of which those in the set are taken first
 MOST_DIGITS = 10_000
 FILE = "examples/problems/circles_in_square.toml"
 
@@ -215,16 +217,16 @@ def _sheet(name: str, given: dict[str, Any], problem: "ProblemFile", proof: "Pro
     return Sheet(name, (*parts, *proof.sheet.parts))
 
 
-def _saved(proof: "Proof", path: Path, row: dict[str, Any]) -> list[Path]:
+def _saved(proof: "Proof", archive: Path, row: dict[str, Any]) -> list[Path]:
     """Save a proof for the checker, or note why there is no file of it."""
-    with writing(path):
+    with writing(archive):
         try:
-            saved = [Path(proof.save(path))]
+            saved = [Path(proof.save(archive))]
         except ValueError as error:
             row["not_saved"] = str(error)
-            remark(f"{path.name} is not written: {error}")
+            remark(f"{archive.name} is not written: {error}")
             return []
-    row["file"] = str(path)
+    row["file"] = str(archive)
     return saved
 
 
@@ -242,11 +244,9 @@ def atlas(file: Path, begin: Begin) -> None:
     problem = read(file)
     search = begin(file.stem, {"file": str(file.resolve())})
 
-    def starts(rng: Any) -> Any:
-        return _starts(problem, rng, STARTS)
-
     d = problem.polyhedron
-    (planar if _flat(problem) else skeletal)(search, d, starts)
+    found = partial(_inner_starts, problem)
+    (planar if _flat(problem) else skeletal)(search, d, found)
 
 
 @command(epilog=examples(f"minima {FILE} --starts 100"))
@@ -275,6 +275,17 @@ def minima(file: Path, starts: int, seed: int, as_json: bool, out: Path | None) 
 
     unit = problem.energy.unit
     report_minima(file.stem, {"file": str(file)}, found, described, unit, as_json=as_json, out=out)
+
+
+def _inner_starts(problem: "ProblemFile", rng: Any) -> Any:
+    """Return the points of a file and random ones, those in the set first, ``(k, n)``."""
+    import numpy as np
+
+    given = len(problem.points)
+    found = _starts(problem, rng, given + DRAWN * STARTS)
+    outside = ~problem.polyhedron.contains(found[given:])
+    order = np.argsort(outside, kind="stable")[: max(STARTS - given, 0)]
+    return np.vstack([found[:given], found[given:][order]])
 
 
 def _starts(problem: "ProblemFile", rng: Any, count: int) -> Any:
@@ -336,11 +347,14 @@ def view(file: Path, out: Path | None, seed: int) -> None:
         from polycorner.pictures import save
 
         rng = np.random.default_rng(seed)
-        found = skeleton(problem.polyhedron, _starts(problem, rng, STARTS), rng=rng)
+        found = skeleton(problem.polyhedron, _inner_starts(problem, rng), rng=rng)
         figure = region_picture(problem.polyhedron, found, [*problem.points.items()])
         path = out or Path(file.stem).with_suffix(".png")
-        with writing(path):
-            save(figure, path)
+        try:
+            with writing(path):
+                save(figure, path)
+        except ValueError as error:
+            fail(f"--out: {str(error).removeprefix('path: ')}")
     click.echo(f"wrote {path}")
     if out is None:
         click.launch(str(path))

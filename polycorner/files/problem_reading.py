@@ -206,6 +206,8 @@ class Reader:
         """Return what is minimised, and whether the file maximises its negative."""
         if "energy" not in self.content:
             return None, False
+        if isinstance(self.content["energy"], str):  # a formula alone is minimised
+            self.content["energy"] = {"minimise": self.content["energy"]}
         table = self._of("energy", dict, {})
         check_keys("energy", table, ("minimise", "maximise", "name", "unit"))
         kinds = [key for key in ("minimise", "maximise") if key in table]

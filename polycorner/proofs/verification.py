@@ -333,7 +333,7 @@ class Proof(Checked, Printed):
         if worst:
             most = ", ".join(f"{name} is {value}" for name, value in worst[:SHOWN_FUNCTIONS])
             more = f" and {len(worst) - SHOWN_FUNCTIONS} more" if worst[SHOWN_FUNCTIONS:] else ""
-            yield "given point", f"not in the set: {most}{more}"
+            yield "starting point", f"rounded to doubles, it is not in the set: {most}{more}"
 
     def _parameter_facts(self) -> Iterator[tuple[str, str]]:
         if not self.parameters:

@@ -150,6 +150,15 @@ def test_bodies_come_back_with_their_unions(tmp_path):
     same(read, squares)
 
 
+def test_a_formula_alone_is_minimised(tmp_path):
+    short, long = tmp_path / "a.toml", tmp_path / "b.toml"
+    short.write_text(SMALL + 'energy = "x"')
+    long.write_text(SMALL + 'energy.minimise = "x"')
+    energies = [load_problem(file).energy.expression for file in (short, long)]
+    assert energies[0] == energies[1]
+    assert not load_problem(short).maximised
+
+
 def test_an_energy_and_points_come_back(tmp_path):
     board = Pinball()
     rng = np.random.default_rng(0)
@@ -309,7 +318,7 @@ MISTAKES = {
         "the period 1",
     ),
     "nothing holds": ('coordinates = ["x"]', "at least one inequality"),
-    "energy": (SMALL + 'energy = "x"', "energy"),
+    "energy": (SMALL + "energy = 3", "energy"),
     "two energies": (SMALL + 'energy = { minimise = "x", maximise = "x" }', "energy"),
     "energy's formula": (SMALL + 'energy.minimise = "foo(x)"', "energy.minimise"),
     "energy's key": (SMALL + 'energy.minimize = "x"', "did you mean minimise?"),
