@@ -76,6 +76,14 @@ def seed_option(of: str, group: str = "Search") -> Callable[[Command], Command]:
     )
 
 
+def digits_option(function: Command) -> Command:
+    """Add ``--digits`` of a proof, as many as :func:`~polycorner.prove` takes."""
+    return option(
+        "--digits", type=click.IntRange(1, 10_000), default=30, group="Proof",
+        help="Significant digits.",
+    )(function)  # fmt: skip
+
+
 def answer_options(function: Command) -> Command:
     """Add ``--json`` and ``--out``."""
     for add in (

@@ -9,7 +9,14 @@ import click
 
 from polycorner.cli.atlas import planar, skeletal
 from polycorner.cli.minima import WORDS, report_minima, start_options
-from polycorner.cli.options import command, examples, option, output_options, seed_option
+from polycorner.cli.options import (
+    command,
+    digits_option,
+    examples,
+    option,
+    output_options,
+    seed_option,
+)
 from polycorner.cli.output import (
     deliver,
     fail,
@@ -30,7 +37,6 @@ if TYPE_CHECKING:
 
 STARTS = 60  # points from which a search for corners descends
 DRAWN = 20  # times as many random points, of which those in the set are taken first
-MOST_DIGITS = 10_000
 FILE = "examples/problems/circles_in_square.toml"
 
 
@@ -64,13 +70,7 @@ def read(file: Path) -> "ProblemFile":
     group="Proof",
     help="Points of the file; repeat for several. [all]",
 )
-@option(
-    "--digits",
-    type=click.IntRange(1, MOST_DIGITS),
-    default=30,
-    group="Proof",
-    help="Significant digits.",
-)
+@digits_option
 @option(
     "--box",
     "boxes",

@@ -26,10 +26,12 @@ def verify(files: tuple[Path, ...], sample: int | None, jobs: int, as_json: bool
 
     The checker shares no code with what proves.  The exit code is 1 if a file is not verified.
     """
+    from polycorner.proofs.checker.verdict import judged
+
     rows = []
     for file in files:
         with working(f"checking {file.name}"):
-            verified, words = _checked(file, sample, jobs)
+            verified, words = judged(str(file), sample, jobs)
         rows.append({"file": str(file), "verified": verified, "verdict": words})
     named = len(rows) > 1
     deliver(
@@ -39,19 +41,3 @@ def verify(files: tuple[Path, ...], sample: int | None, jobs: int, as_json: bool
     )
     if not all(row["verified"] for row in rows):
         raise click.exceptions.Exit(1)
-
-
-def _checked(file: Path, sample: int | None, jobs: int) -> tuple[bool, str]:
-    """Return whether a file is verified, and the line that says so."""
-    from polycorner.proofs.checker.balls import NotShownError
-    from polycorner.proofs.checker.verdict import check
-
-    try:
-        return True, check(str(file), sample, jobs)
-    except NotShownError as error:
-        why = str(error)
-    except OSError as error:
-        why = f"the file cannot be read: {error}"
-    except Exception as error:  # whatever goes wrong, nothing is verified
-        why = f"the file is malformed: {error!r}"
-    return False, f"NOT VERIFIED: {' '.join(why.split())}"

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache
+from math import ceil
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -180,6 +181,15 @@ def roots(coefficients: tuple[int, ...], bits: int) -> "list[Any]":
 
 def _bits(number: Fraction) -> int:
     return max(0, number.numerator.bit_length() - number.denominator.bit_length())
+
+
+MOST_DIGITS = 10_000  # decimal ones that may be asked for
+BITS_PER_DIGIT, GUARD_BITS = 3.3220, 64
+
+
+def bits_for(digits: int) -> int:
+    """Return the working precision in binary digits for a number of decimal digits."""
+    return ceil(digits * BITS_PER_DIGIT) + GUARD_BITS
 
 
 # ------------------------------------------------------------------------------- bounds of a ball

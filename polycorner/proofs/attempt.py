@@ -3,12 +3,11 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations, islice
-from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.balls import GUARD_BITS, ball, bits_for, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate, Entrapment
@@ -37,8 +36,6 @@ if TYPE_CHECKING:
     from polycorner.spaces.manifold import Array
 
 MOST_SUBSETS = 1000  # of one size that are examined
-BITS_PER_DIGIT = 3.3220
-GUARD_BITS = 64
 MOST_FACES = 8  # on which a proof is tried
 BRIEF_FACES = 3  # where something is proved already
 MOST_DOUBLINGS = 3  # of the precision, until every condition is decided
@@ -350,11 +347,6 @@ def _checked(posed: Posed, enclosure: Enclosure | Undecided) -> Mapping[str, Con
     if isinstance(enclosure, Undecided):
         return without_enclosure(enclosure, symmetric=bool(posed.claim.fields))
     return check_hypotheses(posed.claim, enclosure)
-
-
-def bits_for(digits: int) -> int:
-    """Return the working precision in binary digits for a number of decimal digits."""
-    return ceil(digits * BITS_PER_DIGIT) + GUARD_BITS
 
 
 def _enclosed(certificate: Certificate, posed: Posed, bits: int) -> Enclosure | Undecided:

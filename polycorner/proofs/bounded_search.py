@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, exact, precision
+from polycorner.intervals.balls import ball, bits_for, exact, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 UNIT = 1e-3  # share of the energy's slope up to which the support of multipliers is counted
 BITS = 128
-GUARD = 64
 HALVINGS = 60
 TRIES = 8  # boxes in which the growth is shown, and the rest is tried
 SIMPLE = 10_000  # largest denominator of a coordinate that is taken to be rational
@@ -218,7 +217,7 @@ class WitnessSearch:
 
     def run(self, digits: int) -> BoundedMinimum | Undecided:
         """Return the minimum that is shown near the point, or why none is."""
-        bits = int(digits * 3.33) + GUARD
+        bits = bits_for(digits)
         with precision(bits):
             return self._run(bits)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner import checks
+from polycorner.intervals.balls import MOST_DIGITS, bits_for
 from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.proofs.growth import Point
@@ -23,9 +24,7 @@ if TYPE_CHECKING:
 
     Number = float | str | Decimal | Fraction
 
-MOST_DIGITS = 10_000
 LONGEST = 20_000  # characters of a coordinate, and its decimal exponent
-BITS_PER_DIGIT, GUARD_BITS = 3.3220, 64
 
 
 def exact_point(
@@ -83,7 +82,7 @@ def exact_point(
     reach = Fraction(checks.real("within", within, above=0))
     digits = checks.whole("digits", digits, least=1, most=MOST_DIGITS)
     problem = pose(polyhedron, _nothing() if energy is None else energy)
-    place = Signs(problem, int(digits * BITS_PER_DIGIT) + GUARD_BITS)
+    place = Signs(problem, bits_for(digits))
     return _judged(Repair(place, given, reach, digits, costly=energy is not None), digits)
 
 

@@ -51,11 +51,11 @@ class Rattlers:
     def __init__(self, problem: Problem, formulas: Formulas, coordinates: Sequence[int]) -> None:
         self.problem, self.formulas = problem, formulas
         self.coordinates = list(coordinates)
+        self._read = [reads(formulas, i) for i in range(problem.inequalities)]
         self.rows = self._reading(self.coordinates)
 
     def _reading(self, some: Sequence[int]) -> list[int]:
-        read = (reads(self.formulas, i) for i in range(self.problem.inequalities))
-        return [i for i, row in enumerate(read) if not row.isdisjoint(some)]
+        return [i for i, row in enumerate(self._read) if not row.isdisjoint(some)]
 
     def _distances(self, q: "Array") -> "tuple[Array, Array]":
         """Return distances to the zeros of the functions along these coordinates, and normals."""

@@ -43,7 +43,16 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner import checks
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.intervals.balls import ball, between, bounds, decimals, exact, precision
+from polycorner.intervals.balls import (
+    MOST_DIGITS,
+    ball,
+    between,
+    bits_for,
+    bounds,
+    decimals,
+    exact,
+    precision,
+)
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
@@ -51,7 +60,7 @@ from polycorner.minimisation import Certificate, Verdict
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, facts, titled, units
 from polycorner.progress import Progress, silent
-from polycorner.proofs.attempt import Attempt, Posed, attempt, bits_for, pose_claim
+from polycorner.proofs.attempt import Attempt, Posed, attempt, pose_claim
 from polycorner.proofs.bounded import SUBJECT, BoundedMinimum
 from polycorner.proofs.bounded_search import SIMPLE, bounded_minimum
 from polycorner.proofs.files import ProvedFace, UncheckedError, save_cells, save_face, save_minimum
@@ -82,7 +91,7 @@ DOUBLE_DIGITS = 17  # of a floating-point number, which bounds over a box of par
 SHOWN_CELLS = 5  # undecided cells listed in a table
 SHOWN_FUNCTIONS, SHOWN_DIGITS = 3, 3  # of those that the given point violates
 Bounds = tuple[Fraction, Fraction]
-MOST_DIGITS, MOST_CELLS = 10_000, 10_000_000
+MOST_CELLS = 10_000_000
 LARGE = 20  # coordinates from which on faces of a corner with too many contacts are tried last
 MANY = (
     "more contacts close than a choice of them shows; such corners are proved for given parameters"

@@ -8,6 +8,7 @@ import click
 from polycorner.cli import (
     command,
     deliver,
+    digits_option,
     examples,
     fail,
     option,
@@ -34,13 +35,7 @@ UNITS = {"l": "length l (mm)", "t": "rod radius t (mm)"}
 
 @command(epilog=EPILOG)
 @pair_options
-@option(
-    "--digits",
-    type=click.IntRange(1, 10_000),
-    default=30,
-    group="Proof",
-    help="Significant digits.",
-)
+@digits_option
 @option(
     "--box",
     "boxes",

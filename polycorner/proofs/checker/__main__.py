@@ -4,10 +4,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from .balls import NotShownError
-from .verdict import check
-
-MOST_LETTERS = 1000  # of a refusal, which quotes the file
+from .verdict import judged
 
 
 def positive(text: str) -> int:
@@ -31,19 +28,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--jobs", type=positive, default=1, metavar="J", help="processes; 1 by default"
     )
     given = parser.parse_args(arguments)
-    try:
-        print(check(given.file, given.sample, given.jobs))
-    except NotShownError as error:
-        why = str(error)
-    except OSError as error:
-        why = f"the file cannot be read: {error}"
-    except Exception as error:  # whatever goes wrong, nothing is verified
-        why = f"the file is malformed: {error!r}"
-    else:
-        return 0
-    line = " ".join(why.split())
-    print(f"NOT VERIFIED: {line[:MOST_LETTERS]}{'...' if len(line) > MOST_LETTERS else ''}")
-    return 1
+    verified, line = judged(given.file, given.sample, given.jobs)
+    print(line)
+    return 0 if verified else 1
 
 
 if __name__ == "__main__":

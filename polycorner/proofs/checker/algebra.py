@@ -21,7 +21,8 @@ Polynomial = dict[tuple[int, ...], fmpq]  # a monomial repeats its symbols
 ONE: Polynomial = {(): fmpq(1)}
 ARITHMETIC = ("add", "sub", "neg", "mul", "square", "div")
 COMPARED = {"lt": operator.lt, "le": operator.le}
-AT_ZERO = {"sin": 0, "tan": 0, "asin": 0, "atan": 0, "sinh": 0, "tanh": 0, "erf": 0, "cos": 1, "cosh": 1, "exp": 1}  # fmt: skip  # noqa: E501
+AT_ZERO = dict.fromkeys(("sin", "tan", "asin", "atan", "sinh", "tanh", "erf"), 0)
+AT_ZERO |= dict.fromkeys(("cos", "cosh", "exp"), 1)
 
 
 class TooMuchError(Exception):

@@ -19,7 +19,7 @@ from typing import Any
 
 from flint import arb
 
-from .balls import moved, need
+from .balls import NotShownError, moved, need
 from .corners import StoredCorners
 from .problem import CORNERS, StoredProblem
 from .proof import StoredProof
@@ -30,6 +30,7 @@ DIGITS, MOST_TOLD = 10, 8  # of energies; energies that are told one by one
 CHUNK = 500  # leaves that a worker checks at a time
 MOST_UNPACKED = 200  # bytes for each of a file; deflate packs a thousand zeros into one
 MOST_TEXT = 2**24  # bytes of a description, which take twenty times the memory when they are read
+MOST_SAID = 1000  # letters of a refusal, which quotes the file
 PIECE = 2**16  # bytes that are unpacked at a time
 
 
@@ -170,3 +171,17 @@ def said(proof: StoredProof) -> Iterator[str]:
     ):
         if number:
             yield f"{number} {what}"
+
+
+def judged(path: str, sample: int | None, jobs: int) -> tuple[bool, str]:
+    """Return whether a file is verified, and the line that says so, whatever is in it."""
+    try:
+        return True, check(path, sample, jobs)
+    except NotShownError as error:
+        why = str(error)
+    except OSError as error:
+        why = f"the file cannot be read: {error}"
+    except Exception as error:  # whatever goes wrong, nothing is verified
+        why = f"the file is malformed: {error!r}"
+    line = " ".join(why.split())
+    return False, f"NOT VERIFIED: {line[:MOST_SAID]}{'...' if len(line) > MOST_SAID else ''}"
