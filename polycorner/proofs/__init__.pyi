@@ -5,7 +5,8 @@ from .lists.enumeration import stationary_points
 from .lists.stationary import StationaryList, StationaryLocus, StationaryPoint
 from .membership import Membership, Violation
 from .parameter_boxes import ParameterCell
-from .verification import Proof, prove
+from .proof import Proof
+from .verification import prove
 
 __all__ = [
     "CornerList",

@@ -58,17 +58,10 @@ from polycorner.intervals.balls import (
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.minimisation import Problem
 from polycorner.proofs.exact import implied
-from polycorner.proofs.growth import (
-    Examination,
-    Growth,
-    UnshownError,
-    Witness,
-    largest,
-    row_sums,
-    upper_bound,
-)
+from polycorner.proofs.growth import Examination, Growth, largest, row_sums, upper_bound
 from polycorner.proofs.invariance import annihilated
 from polycorner.proofs.rattlers import reads
+from polycorner.proofs.witnesses import UnshownError, Witness
 from polycorner.values import Value
 
 if TYPE_CHECKING:

@@ -18,9 +18,10 @@ from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
 from polycorner.polyhedra.cones import independent_rows, unit_rows
 from polycorner.proofs.bounded import SUBJECT, BoundedMinimum, examine
-from polycorner.proofs.growth import Examination, Gauge, UnshownError, Witness
+from polycorner.proofs.growth import Examination
 from polycorner.proofs.invariance import Generator, generators, translations
 from polycorner.proofs.rattlers import Rattlers, reads
+from polycorner.proofs.witnesses import Gauge, UnshownError, Witness
 from polycorner.tolerances import Tolerances
 
 if TYPE_CHECKING:

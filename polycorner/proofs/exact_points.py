@@ -12,9 +12,9 @@ from polycorner import checks
 from polycorner.intervals.balls import MOST_DIGITS, bits_for
 from polycorner.minimisation.problem import pose
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.proofs.growth import Point
 from polycorner.proofs.membership import Membership, Signs
 from polycorner.proofs.repairs import Repair
+from polycorner.proofs.witnesses import Point
 from polycorner.spaces.manifold import Manifold
 from polycorner.tolerances import DEFAULT
 

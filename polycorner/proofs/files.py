@@ -35,8 +35,8 @@ from polycorner.intervals.enclosures import Formulas, write
 from polycorner.minimisation import Problem
 from polycorner.proofs.checker.balls import NotShownError
 from polycorner.proofs.checker.statements import stated as checked
-from polycorner.proofs.growth import Gauge, Witness
 from polycorner.proofs.parameter_boxes import Interval, ParameterCell, halves
+from polycorner.proofs.witnesses import Gauge, Witness
 from polycorner.values import Value
 
 PROOF = ("polycorner-proof", 1)

@@ -60,69 +60,18 @@ from polycorner.minimisation import Problem
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.definite import pivots
-from polycorner.proofs.invariance import Generator
 from polycorner.proofs.kkt import krawczyk, strictly_inside
 from polycorner.proofs.rattlers import reads
 from polycorner.proofs.symbols import Symbols, evaluate
-from polycorner.values import Value, cached_property
+from polycorner.proofs.witnesses import UnshownError, Witness
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball, Matrix
     from polycorner.spaces.manifold import Array
 
-Point = tuple[Fraction, ...]
 MOST_STEPS, MOST_WIDENED = 200, 6  # of Newton's method, and of the box of Krawczyk's test
 LEAST_BITS = 2000  # of the half side of this box
-
-
-class UnshownError(Exception):
-    """A hypothesis that is not shown, in a sentence."""
-
-
-@dataclass(frozen=True, eq=False)
-class Gauge(Value):
-    """A symmetry and the section that it crosses: a field and a normal in coordinates."""
-
-    field: Generator
-    normal: Point
-
-
-@dataclass(frozen=True, eq=False)
-class Witness(Value):
-    """What a claim is made from; nothing of it is taken on trust.
-
-    Attributes
-    ----------
-    order : int
-        Which lemma is applied, 1 or 2.
-    centre : tuple of Fraction
-        The point ``c``; at coordinates that rattle the middle of their room.
-    inner : tuple of Fraction
-        The point ``p``, up to coordinates that the equations determine.
-    supports, equations : tuple of int
-        Rows of ``S`` and of the equations in ``B``.
-    weights : tuple of Fraction
-        ``lam`` on ``S``, then on the equations.
-    reach : Fraction
-        ``R``, in scale units.
-    room : mapping from int to Fraction
-        Half sides of ``R'`` in scale units, by coordinates.
-    direction : tuple of Fraction
-        ``w``, in scale units.
-    gauges : tuple of Gauge
-        Symmetries modulo which the minimum is one.
-    """
-
-    order: int
-    centre: Point
-    inner: Point
-    supports: tuple[int, ...]
-    equations: tuple[int, ...]
-    weights: Point
-    reach: Fraction
-    room: dict[int, Fraction]
-    direction: Point
-    gauges: tuple[Gauge, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,9 +34,10 @@ from polycorner.minimisation import Problem
 from polycorner.printing import Printed, Sheet, facts, listed
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.exact import implied
-from polycorner.proofs.growth import Examination, Point, UnshownError, Witness
+from polycorner.proofs.growth import Examination
 from polycorner.proofs.rattlers import reads
 from polycorner.proofs.symbols import Symbols, evaluate
+from polycorner.proofs.witnesses import Point, UnshownError, Witness
 from polycorner.values import Checked, Value, cached_property
 
 if TYPE_CHECKING:

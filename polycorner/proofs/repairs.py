@@ -19,9 +19,9 @@ from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import polynomials as algebra
-from polycorner.proofs.growth import Point
 from polycorner.proofs.membership import Bounds, BoxPart, Signs, Violation
 from polycorner.proofs.symbols import Symbols, evaluate
+from polycorner.proofs.witnesses import Point
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
 
