@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.atlas import planar, skeletal
+from polycorner.cli.atlas import STARTS, planar, skeletal
 from polycorner.cli.minima import WORDS, report_minima, start_options
 from polycorner.cli.options import (
     command,
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from polycorner.printing import Sheet
     from polycorner.proofs import Proof
 
-STARTS = 60  # points from which a search for corners descends
 DRAWN = 20  # times as many random points, of which those in the set are taken first
 FILE = "examples/problems/circles_in_square.toml"
 

@@ -33,10 +33,22 @@ Wall = tuple[Family, str, str, tuple[float, ...], str]
 class Container(ABC):
     """Where the centres of balls may be, and how far they are from one another and the walls."""
 
-    dimension: int
-    periods: tuple[float, ...]
     parameters: tuple[str, ...] = ()  # of the gap of two balls
-    unit = 1.0  # length of a unit of the coordinates
+
+    @property
+    def periods(self) -> tuple[float, ...]:
+        """The periods of the coordinates of a centre, one for each."""
+        return (np.inf, np.inf)
+
+    @property
+    def dimension(self) -> int:
+        """The number of these coordinates."""
+        return len(self.periods)
+
+    @property
+    def unit(self) -> float:
+        """The length of a unit of the coordinates."""
+        return 1.0
 
     @property
     def images(self) -> tuple[tuple[int, ...], ...]:
@@ -88,12 +100,7 @@ class BoxContainer(Container):
     sides: tuple[Fraction, ...]
 
     @property
-    def dimension(self) -> int:  # type: ignore[override]
-        """The number of sides."""
-        return len(self.sides)
-
-    @property
-    def periods(self) -> tuple[float, ...]:  # type: ignore[override]
+    def periods(self) -> tuple[float, ...]:
         """Lines."""
         return (np.inf,) * len(self.sides)
 
@@ -129,8 +136,6 @@ class BoxContainer(Container):
 class DiscContainer(Container):
     """The unit disc about the origin."""
 
-    dimension = 2
-    periods = (np.inf, np.inf)
     size = np.pi
 
     def walls(self) -> Iterator[Wall]:
@@ -160,8 +165,12 @@ class TorusContainer(Container):
 
     gram: tuple[Fraction, Fraction, Fraction]
     turn: float = 0.0  # of the first vector against the axis, in radians
-    dimension = 2
-    periods = (1.0, 1.0)
+
+    @property
+    def periods(self) -> tuple[float, ...]:
+        """One for each lattice vector."""
+        return (1.0, 1.0)
+
     parameters = ("p", "q")
 
     @property
@@ -178,7 +187,7 @@ class TorusContainer(Container):
         return np.asarray(flat @ [[c, s], [-s, c]])
 
     @property
-    def unit(self) -> float:  # type: ignore[override]
+    def unit(self) -> float:
         """The length of the first vector."""
         return math.sqrt(self.gram[0])
 
