@@ -1,0 +1,4 @@
+from .landscape import Barrier, Landscape, Merge, Minimum, Pass, Side
+from .routes import Route
+
+__all__ = ["Barrier", "Landscape", "Merge", "Minimum", "Pass", "Route", "Side"]
