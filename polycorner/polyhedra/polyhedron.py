@@ -19,7 +19,7 @@ from polycorner import checks
 from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.polyhedra.groups import AnyOf, Part, collect
+from polycorner.polyhedra.groups import AllOf, AnyOf, Part, collect
 from polycorner.printing import MOST_ROWS, Printed, Sheet, Table
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
@@ -279,6 +279,31 @@ class Polyhedron(Printed, Value):
                 unions.append(pieces)
         return frozenset(always), unions
 
+    def intersected(
+        self,
+        parts: Sequence[Any] | Mapping[str, Any] = (),
+        equations: Sequence[Any] | Mapping[str, Any] = (),
+        *,
+        without: Sequence[str] = (),
+    ) -> "Polyhedron":
+        """Return the intersection with further inequalities and equations.
+
+        Parameters
+        ----------
+        parts, equations : sequence or mapping, optional
+            As for a polyhedron.
+        without : sequence of str, optional
+            Names of inequalities that are left out.
+        """
+        left = frozenset(self.names.index(name) for name in without)
+        tree = _grouped(self.tree, self.functions, left)
+        more = collect(self.manifold, "parts", parts, "g")[0].parts
+        every = collect(self.manifold, "equations", equations, "k")[0].parts
+        whole = [part for part in (tree, *more) if part is not None]
+        return Polyhedron(
+            self.manifold, whole, [*self.stated, *every], annotations=self.annotations
+        )
+
     def selections(self, values: Sequence[float], tolerance: float = 0.0) -> list[Piece]:
         """Return whole branches of the tree that hold at a point, the roomiest first.
 
@@ -369,6 +394,17 @@ def _indexed(part: Any, position: dict[int, int]) -> Tree:
         return position[id(part)]
     children = tuple(_indexed(child, position) for child in part.parts)
     return _Node(union=isinstance(part, AnyOf), children=children)
+
+
+def _grouped(tree: Tree, functions: Sequence[SmoothFunction], without: frozenset[int]) -> Any:
+    """Return an indexed tree as a group, or None if nothing is left of it."""
+    if isinstance(tree, int):
+        return None if tree in without else functions[tree]
+    found = [_grouped(child, functions, without) for child in tree.children]
+    parts = [part for part in found if part is not None]
+    if not parts:
+        return None
+    return AnyOf(*parts) if tree.union else AllOf(*parts)
 
 
 def _groups(part: Any) -> Iterator[Any]:

@@ -61,6 +61,14 @@ def items(conj: Mask, below: Mask, above: Mask) -> tuple[NDArray[np.intp], Mask]
     return boxes, open_[boxes, branches]
 
 
+def merged(boxes: NDArray[np.intp], masks: Mask) -> tuple[NDArray[np.intp], Mask]:
+    """Return one item for each box, with the functions of all its items."""
+    if not len(boxes):
+        return boxes, masks
+    first = np.flatnonzero(np.diff(boxes, prepend=-1))
+    return boxes[first], np.logical_or.reduceat(masks, first, axis=0)
+
+
 def _least(alive: Mask, open_: Mask) -> Mask:
     """Return which branches contain no other one, the first of equal ones, ``(B, c)``."""
     count = alive.shape[1]

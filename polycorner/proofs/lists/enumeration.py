@@ -348,13 +348,13 @@ class _Question:
     resolution: float
     symmetry: Symmetry | None
 
-    def begun(self, kind: type[S], polyhedron: Polyhedron, *, minima_only: bool = False) -> S:
+    def begun(self, kind: type[S], polyhedron: Polyhedron, **options: Any) -> S:
         """Return a search in a polyhedron that has not begun."""
         same = polyhedron is self.problem.polyhedron
         problem = self.problem if same else pose(polyhedron, self.problem.energy)
         motions, maps = _motions(problem, self.domain, self.symmetry)
         about = problem, self.domain, self.resolution
-        search = kind(*about, motions=motions, maps=maps, minima_only=minima_only)
+        search = kind(*about, motions=motions, maps=maps, **options)
         _check_fixed(search, self.symmetry)
         return search
 
@@ -389,10 +389,11 @@ def begun(
     box: Any,
     symmetry: Symmetry | None,
     resolution: float,
+    **options: Any,
 ) -> S:
     """Return a search in the whole of a set that has not begun, after checking its arguments."""
     question = _asked(polyhedron, energy, box, symmetry, resolution)
-    return question.begun(kind, without_multiples(question.problem.polyhedron))
+    return question.begun(kind, without_multiples(question.problem.polyhedron), **options)
 
 
 def _motions(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.proofs.lists.branches import Mask, items
+from polycorner.proofs.lists.branches import Mask, items, merged
 from polycorner.proofs.lists.contraction import narrowed
 from polycorner.proofs.lists.images import dropped
 from polycorner.proofs.lists.intermediate import bent, covered, directions
@@ -101,8 +101,11 @@ def examine(setting: Setting, sharp: bool, boxes: Boxes) -> Examined:
     m = problem.inequalities
     v_lo, v_hi, g_lo, g_hi = setting.functions.gradients(boxes.lower, boxes.upper, monotone=True)
     meets = np.all((v_lo[:, m : m + k] <= 0) & (v_hi[:, m : m + k] >= 0), axis=1)
+    meets &= v_lo[:, -1] <= setting.cap
     where, masks = items(setting.conj, v_hi[:, :m] < 0, v_lo[:, :m] > 0)
     where, masks = where[meets[where]], masks[meets[where]]
+    if setting.critical:
+        where, masks = merged(where, masks)
     units = setting.domain.units
     found, v, weights = directions((g_lo, g_hi), where, masks, k, units, -1.0)
     # Cheap bounds first: they close most boxes, and mean values need second derivatives.

@@ -169,6 +169,10 @@ class Setting:
         Where they take inequalities.
     minima_only : bool
         Whether only local minima are searched.
+    critical : bool
+        Whether all functions that may vanish, in any branch, have to hold together.
+    cap : float
+        An energy above which nothing is searched.
     functions : BoxFunctions
         Inequalities, equations, energy.
     faces : EnclosedFaces
@@ -188,6 +192,8 @@ class Setting:
     motions: tuple[Motion, ...] = ()
     maps: tuple[tuple[int, ...], ...] = ()
     minima_only: bool = False
+    critical: bool = False
+    cap: float = np.inf
     functions: BoxFunctions = field(init=False)
     faces: EnclosedFaces = field(init=False)
     conj: Mask = field(init=False)

@@ -11,7 +11,7 @@ another piece if that carries the same functions and its box contains ``p``, and
 stationary in another piece that contains it if nothing of that piece's list is near.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -46,27 +46,34 @@ from polycorner.spaces.manifold import Array
 Names = frozenset[str]
 
 
-def listed(search: BoxSearch, problem: Problem) -> StationaryList:
-    """Return what a search found for a problem, in whose coordinates parameters are left out."""
-    points: list[StationaryPoint] = []
-    open_points: list[StationaryPoint] = []
-    known, orbits, (members, ways) = Listed(search), 0, settled(search)
-    for _, member in members:
+def each(search: BoxSearch, members: Iterable[Member]) -> Iterator[tuple[Member, int, bool]]:
+    """Yield members and their images, each once, with their orbits, and whether they are open."""
+    known, orbits = Listed(search), 0
+    for member in members:
         before = known.has(member)
         if before:
             continue  # an image of one before
         known.add(member)
-        if member.place == OPEN or before is None:
-            open_points.append(point_of(search, member, orbits))
+        is_open = member.place == OPEN or before is None
+        yield member, orbits, is_open
+        if is_open:
             continue
-        points.append(point_of(search, member, orbits))
         for image in images(search, member):
             # An image that is not decided to be another point is told as one that may be.
             alike = known.has(image)
             if not alike:
                 known.add(image)
-                (points if alike is False else open_points).append(point_of(search, image, orbits))
+                yield image, orbits, alike is None
         orbits += 1
+
+
+def listed(search: BoxSearch, problem: Problem) -> StationaryList:
+    """Return what a search found for a problem, in whose coordinates parameters are left out."""
+    points: list[StationaryPoint] = []
+    open_points: list[StationaryPoint] = []
+    members, ways = settled(search)
+    for member, orbit, is_open in each(search, (member for _, member in members)):
+        (open_points if is_open else points).append(point_of(search, member, orbit))
     return StationaryList(
         problem,
         *box_of(search, problem),

@@ -214,10 +214,12 @@ def judged(search: BoxSearch, region: Region) -> Member:
     sure = [not (c & unknown).any() for c in possible]
     some = [bool((held & ~c).any()) for c in possible]
     fewer = [less and not (c & zeros & ~held).any() for c, less in zip(possible, some, strict=True)]
-    if any(a and b for a, b in zip(sure, fewer, strict=True)):
-        return Member(region, *sets, OUT, free)
     # With parameters a point may be in the domain for some of their values and not for others.
     held_in = search.domain.holds(lower, upper, ROUNDING)
+    if search.critical:
+        return Member(region, *sets, IN if held_in and any(sure) else OPEN, free)
+    if any(a and b for a, b in zip(sure, fewer, strict=True)):
+        return Member(region, *sets, OUT, free)
     return Member(region, *sets, IN if held_in and any(sure) and not any(some) else OPEN, free)
 
 

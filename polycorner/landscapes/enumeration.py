@@ -1,0 +1,174 @@
+"""The landscape of an energy on a polyhedron: from lists with proof, or from a search."""
+
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from polycorner import checks
+from polycorner.intervals.boxes import BoxFunctions
+from polycorner.landscapes.curves import Curves
+from polycorner.landscapes.landscape import Landscape
+from polycorner.landscapes.passes import Sorted
+from polycorner.minimisation.problem import Problem, pose
+from polycorner.polyhedra import Polyhedron, Symmetry
+from polycorner.progress import Progress, silent
+from polycorner.proofs import Domain, critical_points, domain, stationary_points
+from polycorner.tolerances import SEARCH
+
+if TYPE_CHECKING:
+    from polycorner.minimisation.problem import Energy
+
+MOST_BOXES = 20_000  # with which a side of a box is shown to miss the set
+BEYOND = 1 / 64  # of a side that is a wall, by which boxes reach beyond it
+
+
+def landscape(
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    *,
+    box: Any,
+    region: Any = (),
+    symmetry: Symmetry | None = None,
+    cap: float = inf,
+    resolution: float = SEARCH.resolution,
+    max_boxes: int = SEARCH.max_boxes,
+    max_seconds: float = inf,
+    workers: int = 1,
+    progress: Progress = silent,
+) -> Landscape:
+    """Find all minima and passes of an energy on a polyhedron in a box, with proof.
+
+    Critical points are listed by branch and bound
+    (:mod:`~polycorner.proofs.lists.critical`), sorted into minima, passes and others
+    (:mod:`~polycorner.landscapes.passes`), and from each pass verified routes lead down to the
+    minima on its sides (:mod:`~polycorner.landscapes.descents`).
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        The set ``D``, on lines and circles; and/or trees and equations are allowed.
+    energy : SmoothFunction or SymPy expression
+        The energy ``E``.
+    box : sequence or mapping
+        As for :func:`.stationary_points`.  A side is a wall, called ``x > 0`` or ``x < 1``, unless
+        it is shown that ``D`` does not meet it.
+    region : parts of a polyhedron, optional
+        Inequalities ``g >= 0`` of a region that may be left: see :meth:`.Landscape.escape`.
+    symmetry : Symmetry, optional
+        As for :func:`.stationary_points`.
+    cap : float, optional
+        An energy above which nothing is asked.
+    resolution, max_boxes, max_seconds, workers, progress : optional
+        As for :func:`.stationary_points`, for each list.
+
+    Returns
+    -------
+    Landscape
+        What is not decided is among the passes, so that bounds from below are proved in any case.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As :func:`.stationary_points` does.
+
+    Examples
+    --------
+    >>> from polycorner import Manifold
+    >>> M = Manifold.euclidean("x y")
+    >>> x, y = M.symbols
+    >>> D = Polyhedron(M, {"disc": 9 - x**2 - y**2})
+    >>> found = landscape(D, (x**2 - 1) ** 2 + y**2 + x / 10, box=[(-3, 3), (-3, 3)])
+    >>> found.complete, len(found.minima), len(found.passes)
+    (True, 2, 1)
+    >>> found.barrier(1, 0).rise
+    """
+    checks.real("cap", cap, infinite=True)
+    posed = pose(polyhedron, energy)
+    whole = domain(polyhedron.manifold, box)
+    if symmetry is not None:
+        checks.instance("symmetry", symmetry, Symmetry)
+    limited = polyhedron.intersected(region)
+    exits = limited.names[len(polyhedron.functions) :]
+    walls, sides, notes = _walls(pose(limited, posed.energy), whole, symmetry, cap)
+    bounded = limited.intersected(walls) if walls else limited
+    options: dict[str, Any] = {"box": sides, "resolution": resolution, "progress": progress}
+    limits: dict[str, Any] = {
+        "max_boxes": max_boxes,
+        "max_seconds": max_seconds,
+        "workers": workers,
+    }
+    found = critical_points(
+        bounded, posed.energy, symmetry=symmetry, cap=cap, limits=limits, **options
+    )
+    ordered = Sorted(found, frozenset(exits), Curves(found.problem), cap)
+    for name in exits:
+        d = found.problem.polyhedron
+        wall = d.functions[d.names.index(name)]
+        on = d.intersected(equations=[wall], without=[name])
+        listed = stationary_points(on, posed.energy, minima_only=True, **options, **limits)
+        ordered.leave(listed, name)
+    passes = tuple(ordered.passes())
+    return Landscape(
+        posed,
+        tuple(node.minimum for node in ordered.nodes),
+        passes,
+        True,
+        float(cap),
+        bool(exits),
+        (*notes, *dict.fromkeys(ordered.notes)),
+    )
+
+
+def _walls(
+    problem: Problem, box: Domain, symmetry: Symmetry | None, cap: float
+) -> tuple[dict[str, Any], list[Any], tuple[str, ...]]:
+    """Return the sides of a box that the set meets as inequalities, and sides to search in."""
+    manifold = problem.polyhedron.manifold
+    functions = BoxFunctions(problem.functions, manifold)
+    lined = [i for i in box.free if box.upper[i] - box.lower[i] < manifold.periods[i]]
+    met = {
+        (i, k) for i in lined for k in (0, 1)
+        if not _misses(problem, functions, box, i, (box.lower, box.upper)[k][i], cap)
+    }  # fmt: skip
+    if met and symmetry is not None:
+        met = {(i, k) for i in lined for k in (0, 1)}  # the same ones at the images of each
+    walls: dict[str, Any] = {}
+    ends = zip(box.lower.tolist(), box.upper.tolist(), strict=True)
+    sides: list[Any] = [[a, b] if a < b else a for a, b in ends]
+    for i, k in sorted(met):
+        name, value = manifold.names[i], float((box.lower, box.upper)[k][i])
+        q = manifold.symbols[i]
+        walls[f"{name} {'<' if k else '>'} {value:g}"] = value - q if k else q - value
+        width = box.upper[i] - box.lower[i]
+        more = min(BEYOND * width, 0.45 * (manifold.periods[i] - width))
+        sides[i][k] += more if k else -more
+    whole = [None if i not in lined and i in box.free else side for i, side in enumerate(sides)]
+    note = f"Sides of the box are walls: {', '.join(walls)}." if walls else ""
+    return walls, whole, (note,) if note else ()
+
+
+def _misses(
+    problem: Problem, functions: BoxFunctions, box: Domain, axis: int, value: float, cap: float
+) -> bool:
+    """Whether it is shown that the set, up to an energy, does not meet a side of a box."""
+    m, treated = problem.inequalities, 0
+    lower, upper = box.lower[None].copy(), box.upper[None].copy()
+    lower[:, axis] = upper[:, axis] = value
+    units = np.where(box.units > 0, box.units, np.inf)
+    while len(lower) and treated < MOST_BOXES:
+        treated += len(lower)
+        low, high = functions.values(lower, upper)
+        left = problem.polyhedron.implicit_of(high[:, :m]) >= 0
+        zeros = (low[:, m:-1] <= 0) & (high[:, m:-1] >= 0)
+        left &= zeros.all(axis=1) & (low[:, -1] <= cap)
+        lower, upper = lower[left], upper[left]
+        sides = (upper - lower) / units
+        if len(lower) and (sides.max(axis=1) <= 0).any():
+            return False  # a point that may be in the set
+        each, split = np.arange(len(lower)), sides.argmax(axis=1)
+        middle = 0.5 * (lower + upper)[each, split]
+        first, second = upper.copy(), lower.copy()
+        first[each, split] = second[each, split] = middle
+        lower, upper = np.concatenate([lower, second]), np.concatenate([first, upper])
+    return not len(lower)

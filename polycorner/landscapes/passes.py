@@ -1,0 +1,421 @@
+"""From complete lists to minima and passes: what can join components of sublevel sets, and where.
+
+Components of ``D_c = {q in D : E(q) <= c}`` change at critical points alone
+(:mod:`~polycorner.proofs.lists.critical`).  Let the gradients of the functions ``A`` that vanish at
+one be independent, ``dE = sum lam_i df_i`` with ``lam_i > 0`` for all of them, and the
+Lagrangian's Hessian on the face ``f_A = 0`` be regular with ``k`` negative eigenvalues.  Let
+``nu`` be the number of components of ``{E < E(p)}`` in ``D`` near ``p``.
+
+*Intersections.*  ``nu`` is 0, 2, 1 for ``k = 0``, ``k = 1``, ``k >= 2``.  *Proof.*  In coordinates
+``u = (f_i g_i), y`` with ``g_i > 0`` the energy is ``E(p) + sum u_i + Q(y)`` and the set is
+``u >= 0``; ``{sum u_i + Q < 0, u >= 0}`` retracts to ``{u = 0, Q < 0}``, which is empty, two cones,
+or connected.
+
+*Unions.*  Let ``beta_1, beta_2, ...`` be the minimal sets of functions of ``A`` one of which has to
+hold.  If there is but one, and it is ``A``, the above applies.  Otherwise join ``beta`` and
+``gamma`` unless ``beta u gamma = A``; ``nu`` is the number of classes for ``k = 0`` and 1 for
+``k >= 1``.  *Proof.*  Near ``p`` each part ``{f_beta >= 0, sum u_i < 0}`` is convex in these
+coordinates and not empty, and two meet unless all ``u_i >= 0`` in both.  With ``Q`` the parts are
+joined along a direction in which ``Q < 0``.
+
+*Loci.*  Where ``E`` depends on ``z`` alone and has a regular stationary point of index ``k`` there,
+each connected component of the points of ``D`` with this ``z`` counts as one point; the two sides
+for ``k = 1`` differ in the sign of the unstable coordinate of ``z``, all along it.
+
+*Regions that may be left.*  A component of ``D_c`` in the region reaches the wall ``g = 0`` exactly
+if it contains a local minimum of ``E`` on that wall: the lowest of its points there is one.
+
+A pass joins what lies on its sides.  A verified route from a side, below the pass, says which
+component that is (:mod:`.descents`).  A pass without such routes, and whatever the list leaves
+undecided, is taken to join everything, from the least energy it may have: bounds from below hold
+all the same.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import linprog
+
+from polycorner.intervals.balls import ball, between, precision
+from polycorner.landscapes.components import components
+from polycorner.landscapes.curves import BITS, Curves, Spot
+from polycorner.landscapes.descents import Descents, Target
+from polycorner.landscapes.landscape import OUTSIDE, Bounds, Kind, Minimum, Pass, Side
+from polycorner.polyhedra.polyhedron import Piece
+from polycorner.proofs import CriticalList, CriticalPoint, StationaryList
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
+
+if TYPE_CHECKING:
+    from polycorner.proofs import Motion
+
+
+@dataclass
+class Candidate:
+    """A pass before its sides are known.
+
+    Attributes
+    ----------
+    spot : Spot
+    active : tuple of str
+    index : int or None
+    kind : str
+    orbit : int
+    starts : list of (bool, frozenset of int, (n,) array)
+        For each side whether it begins along the face, the functions that stay zero or grow, and a
+        direction in scaled coordinates.
+    sides : list of Side
+    """
+
+    spot: Spot
+    active: tuple[str, ...]
+    index: int | None
+    kind: Kind
+    orbit: int
+    energy: Bounds
+    starts: list[tuple[bool, frozenset[int], Array]] = field(default_factory=list)
+    sides: list[Side] = field(default_factory=list)
+
+
+@dataclass
+class Node:
+    """A minimum, or a component of a locus of minima, and where descents to it end."""
+
+    minimum: Minimum
+    target: Target
+
+
+class Sorted:
+    """The critical points of a list, by what they are."""
+
+    def __init__(
+        self, found: CriticalList, exits: frozenset[str], room: Curves, cap: float
+    ) -> None:
+        self.found, self.problem, self.exits = found, found.problem, exits
+        self.curves, self.cap = room, cap
+        self.descents = Descents(room, found.domain.free)
+        self.nodes: list[Node] = []
+        self.outside: list[Target] = []  # minima at the walls of a region that may be left
+        self.candidates: list[Candidate] = []
+        self.notes: list[str] = []
+        for point in found.points:
+            self._sort(point)
+        for box in found.undecided:
+            self._undecided(box[0], box[1])
+        self._loci()
+
+    # ------------------------------------------------------------------------------ what they are
+
+    def spot(self, lower: Array, upper: Array, zeros: frozenset[int]) -> Spot:
+        """Return an enclosed point."""
+        with precision(BITS):
+            box = tuple(between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True))
+        return Spot(box, zeros)
+
+    def energy(self, spot: Spot) -> Bounds:
+        """Return bounds of the energy on a box."""
+        return bounds_of(self.curves, spot)
+
+    def _sort(self, one: CriticalPoint) -> None:
+        p, d = one.point, self.problem.polyhedron
+        spot = self.spot(p.lower, p.upper, one.zeros)
+        values = d.values(spot.middle)
+        signs = [0 if i in one.zeros else int(np.sign(v)) for i, v in enumerate(values)]
+        held = frozenset(d.names.index(name) for name in p.active)
+        pieces = d.signs_to_pieces(signs)
+        matter = frozenset().union(*pieces) if pieces else frozenset()
+        if one.is_open or one.unknown:
+            self._undecided(p.lower, p.upper, p.active, p.orbit)
+        elif len(pieces) == 1 and p.index == 0 and pieces[0] >= held:
+            self._minimum(spot, p.active, p.orbit)
+        elif one.zeros != held or p.index is None:
+            self._undecided(p.lower, p.upper, p.active, p.orbit)
+        elif matter == held:
+            self._regular(spot, one, held, pieces)
+
+    def _regular(
+        self, spot: Spot, one: CriticalPoint, held: frozenset[int], pieces: Sequence[Piece]
+    ) -> None:
+        """Sort a point with independent gradients and positive multipliers."""
+        p = one.point
+        about = spot, p.active, p.index
+        if len(pieces) == 1:
+            if p.index == 1:
+                way = self._downwards(spot, held)
+                starts = [] if way is None else [(True, held, way), (True, held, -way)]
+                new = Candidate(*about, "saddle", p.orbit, self.energy(spot), starts)
+                self.candidates.append(new)
+        elif p.index == 0:
+            classes = parted(held, pieces)
+            if len(classes) > 1:
+                ways = [(piece, self._into(spot, piece)) for piece in classes]
+                starts = [(False, piece, way) for piece, way in ways if way is not None]
+                starts = starts if len(starts) == len(classes) else []
+                new = Candidate(*about, "tip", p.orbit, self.energy(spot), starts)
+                self.candidates.append(new)
+
+    def _minimum(self, spot: Spot, active: tuple[str, ...], orbit: int) -> None:
+        target = self.descents.target(spot)
+        if self.exits.intersection(self.problem.polyhedron.names[i] for i in spot.zeros):
+            self.outside.append(target)
+            return
+        new = Minimum(spot.middle, self.energy(spot), active, "isolated", orbit)
+        self.nodes.append(Node(new, target))
+
+    def _undecided(
+        self, lower: Array, upper: Array, active: tuple[str, ...] = (), orbit: int = -1
+    ) -> None:
+        spot = self.spot(lower, upper, frozenset())
+        new = Candidate(spot, active, None, "undecided", orbit, self.energy(spot))
+        self.candidates.append(new)
+
+    def _downwards(self, spot: Spot, held: frozenset[int]) -> Array | None:
+        """Return the direction of negative curvature on a face, scaled."""
+        rows = [*sorted(held), *self.curves.equations]
+        _, slopes, bends = self.problem.evaluate(spot.middle, 2)
+        free = self.descents.free
+        a, g = slopes[rows][:, free], slopes[-1][free]
+        lam = np.linalg.lstsq(a.T, g, rcond=None)[0] if rows else np.zeros(0)
+        form = (bends[-1] - np.einsum("i,ijk->jk", lam, bends[rows]))[np.ix_(free, free)]
+        null = np.linalg.svd(a)[2][len(rows) :].T if rows else np.eye(int(free.sum()))
+        values, vectors = np.linalg.eigh(null.T @ form @ null)
+        if not len(values) or not values[0] < 0:
+            return None
+        way = np.zeros(len(free))
+        way[free] = null @ vectors[:, 0]
+        return way
+
+    def _into(self, spot: Spot, piece: frozenset[int]) -> Array | None:
+        """Return a scaled direction in which the energy falls and the functions of a piece grow."""
+        slopes: Array = self.problem.evaluate(spot.middle, 1)[1]
+        free = np.flatnonzero(self.descents.free)
+        rows = slopes[[*sorted(piece), self.curves.energy]][:, free]
+        rows[-1] *= -1
+        sizes = np.linalg.norm(rows, axis=1)
+        if not (sizes > 0).all():
+            return None
+        level = slopes[list(self.curves.equations)][:, free]
+        found = linprog(
+            np.append(np.zeros(len(free)), -1.0),
+            A_ub=np.column_stack([-rows / sizes[:, None], np.ones(len(rows))]),
+            b_ub=np.zeros(len(rows)),
+            A_eq=np.column_stack([level, np.zeros(len(level))]) if len(level) else None,
+            b_eq=np.zeros(len(level)) if len(level) else None,
+            bounds=[*[(-1, 1)] * len(free), (None, 1)],
+        )
+        if found.x is None or not found.x[-1] > 0:
+            return None
+        way = np.zeros(self.problem.dimension)
+        way[free] = found.x[:-1] / np.linalg.norm(found.x[:-1])
+        return way
+
+    def _loci(self) -> None:
+        """Sort loci, each connected component by itself."""
+        domain, d = self.found.domain, self.problem.polyhedron
+        for number, place in enumerate(self.found.loci):
+            z = list(place.z)
+            lower, upper = domain.lower.copy(), domain.upper.copy()
+            lower[z], upper[z] = place.sharp_lower, place.sharp_upper
+            if place.sample is None:
+                self._undecided(lower, upper)
+                continue
+            if place.index > 1:
+                continue
+            parts = components(self.problem, domain, z, lower, upper)
+            if parts.open:
+                self.notes.append(
+                    "Whether points with "
+                    f"{', '.join(d.manifold.names[i] for i in z)} of a locus are connected is "
+                    "decided up to boxes that are left."
+                )
+            for k, sample in enumerate(parts.samples):
+                low, high = sample.copy(), sample.copy()
+                low[z], high[z] = place.sharp_lower, place.sharp_upper
+                spot = self.spot(low, high, frozenset())
+                orbit = -2 - number
+                if place.index == 0:
+                    new = Minimum(spot.middle, self.energy(spot), (), "locus", orbit)
+                    target = self.descents.target(spot, parts.part(k))
+                    self.nodes.append(Node(new, target))
+                else:
+                    way = self._unstable(spot, z)
+                    starts = [] if way is None else [
+                        (True, frozenset[int](), way), (True, frozenset[int](), -way)
+                    ]  # fmt: skip
+                    energy = self.energy(spot)
+                    self.candidates.append(Candidate(spot, (), 1, "locus", orbit, energy, starts))
+
+    def _unstable(self, spot: Spot, z: Sequence[int]) -> Array | None:
+        bends = self.problem.evaluate(spot.middle, 2)[2][-1]
+        values, vectors = np.linalg.eigh(bends[np.ix_(z, z)])
+        way = np.zeros(self.problem.dimension)
+        way[list(z)] = vectors[:, 0]
+        return way if values[0] < 0 else None
+
+    # ------------------------------------------------------------------------------------- exits
+
+    def leave(self, found: StationaryList, wall: str) -> None:
+        """Add the points where a region can be left through a wall: the minima on it."""
+        d = self.problem.polyhedron
+        g = d.names.index(wall)
+        for p in found.points:
+            lam = p.multipliers.get(wall)
+            zeros = frozenset(d.names.index(name) for name in (*p.active, *p.redundant)) | {g}
+            spot = self.spot(p.lower, p.upper, zeros)
+            plain = p.index == 0 and not p.redundant and lam is not None
+            if lam is not None and plain and lam[0] > 0 and not d.is_union:
+                continue  # a minimum of the region itself, at its wall
+            values = d.values(spot.middle)
+            signs = [0 if i in zeros else int(np.sign(v)) for i, v in enumerate(values)]
+            pieces = d.signs_to_pieces(signs)
+            starts = []
+            if lam is not None and lam[1] < 0:
+                ways = [(piece, self._into(spot, piece)) for piece in pieces]
+                starts = [(False, piece, way) for piece, way in ways if way is not None][:1]
+            self.candidates.append(
+                Candidate(
+                    spot, (*p.active, wall), p.index, "exit", -1, self.energy(spot), starts,
+                    [Side(OUTSIDE)],
+                )
+            )  # fmt: skip
+        for p in found.open_points:
+            self._undecided(p.lower, p.upper, (*p.active, wall))
+        for box in found.undecided:
+            self._undecided(box[0], box[1], (wall,))
+        if found.loci:
+            for place in found.loci:
+                lower, upper = found.domain.lower.copy(), found.domain.upper.copy()
+                for name, low in place.lower.items():
+                    i = d.manifold.names.index(name)
+                    lower[i], upper[i] = low, place.upper[name]
+                self._undecided(lower, upper, (wall,))
+
+    # ------------------------------------------------------------------------------------- sides
+
+    def passes(self) -> Iterator[Pass]:
+        """Yield the passes, with their sides followed down, each orbit once and carried along."""
+        self.nodes.sort(key=lambda node: node.minimum.energy)
+        targets = [*(node.target for node in self.nodes), *self.outside]
+        motions = [(g, self._permutation(g)) for g in self.found.motions]
+        known: dict[tuple[int, str], Pass] = {}
+        for one in sorted(self.candidates, key=lambda c: c.energy):
+            first = known.get((one.orbit, one.kind)) if one.orbit >= 0 else None
+            image = None if first is None else self._image(first, one, motions)
+            if image is not None:
+                yield image
+                continue
+            sides = [*one.sides, *(self._side(one, start, targets) for start in one.starts)]
+            if one.kind == "exit" and not one.starts:
+                sides = []
+            new = Pass(
+                one.spot.middle, one.energy, one.active, one.index, one.kind, tuple(sides),
+                one.orbit,
+            )  # fmt: skip
+            if one.orbit >= 0:
+                known.setdefault((one.orbit, one.kind), new)
+            yield new
+
+    def _side(
+        self,
+        one: Candidate,
+        start: tuple[bool, frozenset[int], Array],
+        targets: Sequence[Target],
+    ) -> Side:
+        bent, held, way = start
+        if bent:
+            begun = self.descents.begin(one.spot, held, way)
+        else:
+            begun = self.descents.fall(one.spot, held, way)
+        if not begun:
+            return Side(None)
+        found = self.descents.route(begun, one.spot, targets)
+        if found is None:
+            return Side(None)
+        number, route = found
+        if number >= len(self.nodes):
+            return Side(OUTSIDE, route)
+        return Side(number, route)
+
+    def _permutation(self, g: "Motion") -> list[int | None]:
+        """Return where a symmetry takes the nodes; None where that is not decided."""
+        manifold = self.problem.polyhedron.manifold
+        found: list[int | None] = []
+        for node in self.nodes:
+            q = g(node.target.spot.middle, manifold)
+            here = []
+            for k, other in enumerate(self.nodes):
+                apart = abs(manifold.difference(q, other.target.spot.middle)) / self.problem.scales
+                apart[node.target.along] = 0.0
+                alike = (node.target.part is None) == (other.target.part is None)
+                if (
+                    alike
+                    and apart.max() < 1e-7
+                    and (not other.target.part or other.target.part.has(q))
+                ):
+                    here.append(k)
+            found.append(here[0] if len(here) == 1 else None)
+        return found
+
+    def _image(
+        self,
+        first: Pass,
+        one: Candidate,
+        motions: "Sequence[tuple[Motion, list[int | None]]]",
+    ) -> Pass | None:
+        """Return a pass carried along by the symmetry that takes another one to it."""
+        manifold = self.problem.polyhedron.manifold
+        for g, moved in motions:
+            apart = abs(manifold.difference(g(first.point, manifold), one.spot.middle))
+            if (apart / self.problem.scales).max() < DEFAULT.same:
+                sides = []
+                for side in first.sides:
+                    if side.minimum is None or side.route is None or side.minimum < 0:
+                        sides.append(side)
+                        continue
+                    there = moved[side.minimum]
+                    if there is None:
+                        return None
+                    path = np.array([g(q, manifold) for q in side.route.vertices])
+                    sides.append(Side(there, replace(side.route, vertices=unwound(manifold, path))))
+                return Pass(
+                    one.spot.middle, one.energy, one.active, one.index, one.kind, tuple(sides),
+                    one.orbit,
+                )  # fmt: skip
+        return None
+
+
+def unwound(manifold: Manifold, path: Array) -> Array:
+    """Return a path whose steps around circles are the short ones."""
+    steps = [manifold.difference(b, a) for a, b in pairwise(path)]
+    return np.vstack([path[:1], path[0] + np.cumsum(steps, axis=0)]) if steps else path
+
+
+def parted(active: frozenset[int], pieces: Sequence[Piece]) -> list[Piece]:
+    """Return a piece of each class of those that lower points join; see the module."""
+    root = list(range(len(pieces)))
+
+    def find(a: int) -> int:
+        while root[a] != a:
+            a = root[a]
+        return a
+
+    for a, b in combinations(range(len(pieces)), 2):
+        if pieces[a] | pieces[b] != active:
+            root[find(b)] = find(a)
+    return [piece for k, piece in enumerate(pieces) if root[k] == k]
+
+
+def bounds_of(curves: Curves, spot: Spot) -> Bounds:
+    """Return bounds of the energy on a box, as doubles."""
+    with precision(BITS):
+        value = curves.value(spot.box)
+        if not value.is_finite():
+            return -np.inf, np.inf
+        low, high = float(value.lower()), float(value.upper())
+        # Conversion rounds to nearest.
+        low = low if ball(low) <= value.lower() else float(np.nextafter(low, -np.inf))
+        high = high if ball(high) >= value.upper() else float(np.nextafter(high, np.inf))
+    return low, high

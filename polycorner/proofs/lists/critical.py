@@ -1,0 +1,134 @@
+"""Complete lists of critical points: where components of sublevel sets of a union may merge.
+
+Let ``D`` be a union of intersections, and ``A`` the functions that vanish at a point ``q`` of it,
+in whatever branch that may contain it.  The point is *critical* unless some ``v`` has ``dE v < 0``,
+``df_i v > 0`` for all ``i`` in ``A``, and ``dh v = 0`` for the equations, whose gradients are
+independent.
+
+**Theorem.**  Let no point of the compact set ``D`` with ``a <= E <= b`` be critical.  Then
+``D_a = {q in D : E <= a}`` is a deformation retract of ``D_b``.
+
+*Proof.*  Such a ``v``, made tangent to the equations nearby, serves in a neighbourhood, in which no
+functions vanish but those of ``A``.  A partition of unity gives a field with these properties.  Its
+flow decreases ``E`` at a rate that is bounded below, and increases each function where that
+vanishes: none of those that are nonnegative becomes negative, so that each branch that contains the
+point keeps it.  Stop at ``a``.
+
+A list is complete if every box in which none is listed is closed by such a direction, for all
+functions that may vanish in it; the search is that for stationary points
+(:mod:`~polycorner.proofs.lists.search`), with the branches of a box in one item.  Were gradients of
+active functions positively dependent at a point that is not listed, then either no more than can be
+independent were, and there is no such direction; or they span positively, and the point is a KKT
+point of some of them (Caratheodory).
+
+Of an intersection critical points are the stationary ones.  A union has others, such as the tip of
+an obstacle on the far side of which a ball is held.
+"""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from polycorner.interrupts import first_interrupt
+from polycorner.minimisation.problem import Problem
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.progress import Progress, silent
+from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.enumeration import Limits, begun
+from polycorner.proofs.lists.images import Motion
+from polycorner.proofs.lists.listing import each, loci_of, point_of, undecided
+from polycorner.proofs.lists.loci import LocusRegion
+from polycorner.proofs.lists.members import settled
+from polycorner.proofs.lists.search import StationarySearch, Tally
+from polycorner.proofs.lists.stationary import StationaryPoint
+from polycorner.spaces.manifold import Array
+from polycorner.tolerances import SEARCH
+from polycorner.values import Value
+
+if TYPE_CHECKING:
+    from polycorner.minimisation.problem import Energy
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalPoint(Value):
+    """A box with exactly one critical point, where the gradients of some functions are independent.
+
+    Attributes
+    ----------
+    point : StationaryPoint
+        Its active functions have positive multipliers; ``index`` belongs to these alone.
+    zeros, unknown : frozenset of int
+        Inequalities that vanish there, and those that may.
+    is_open : bool
+        Whether it is not decided that it is a point of the set, in the domain, and another one.
+    """
+
+    point: StationaryPoint
+    zeros: frozenset[int]
+    unknown: frozenset[int]
+    is_open: bool
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalList(Value):
+    """All critical points in a box.
+
+    Attributes
+    ----------
+    problem : Problem
+        Without functions that are positive multiples of others.
+    domain : Domain
+    points : tuple of CriticalPoint
+        With their images, each once; but no images of open ones.
+    loci : tuple of LocusRegion
+    undecided : (k, 2, n) array
+        Boxes outside of which, and of their images, there are no others.
+    motions : tuple of Motion
+        The group of the declared symmetries, without the identity.
+    tally : Tally
+    """
+
+    problem: Problem
+    domain: Domain
+    points: tuple[CriticalPoint, ...]
+    loci: tuple[LocusRegion, ...]
+    undecided: Array
+    motions: tuple[Motion, ...]
+    tally: Tally
+
+
+def critical_points(
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    *,
+    box: Any,
+    symmetry: Symmetry | None = None,
+    cap: float = float("inf"),
+    resolution: float = SEARCH.resolution,
+    limits: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+) -> CriticalList:
+    """Return all critical points up to an energy; see :func:`.stationary_points`."""
+    search = begun(
+        StationarySearch, polyhedron, energy, box, symmetry, resolution, critical=True, cap=cap
+    )
+    stop = threading.Event()
+    given = {"max_boxes": SEARCH.max_boxes, "max_seconds": float("inf"), "workers": 1}
+    with first_interrupt(stop.set):
+        Limits(**{**given, **(limits or {})}, progress=progress).run(search, stop)
+    members = (member for _, member in settled(search)[0])
+    points = [
+        CriticalPoint(point_of(search, one, orbit), one.zeros, one.unknown, is_open)
+        for one, orbit, is_open in each(search, members)
+    ]
+    return CriticalList(
+        search.problem,
+        search.domain,
+        tuple(points),
+        tuple(loci_of(search)),
+        undecided(search),
+        tuple(search.motions),
+        search.tally,
+    )
