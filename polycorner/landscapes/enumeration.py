@@ -1,5 +1,7 @@
 """The landscape of an energy on a polyhedron: from lists with proof, or from a search."""
 
+import math
+from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +15,7 @@ from polycorner.landscapes.passes import Sorted
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra import Polyhedron, Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.proofs import Domain, critical_points, domain, stationary_points
+from polycorner.proofs import Domain, Limits, critical_points, domain, stationary_points
 from polycorner.tolerances import SEARCH
 
 if TYPE_CHECKING:
@@ -53,8 +55,9 @@ def landscape(
     box : sequence or mapping
         As for :func:`.stationary_points`.  A side is a wall, called ``x > 0`` or ``x < 1``, unless
         it is shown that ``D`` does not meet it.
-    region : parts of a polyhedron, optional
-        Inequalities ``g >= 0`` of a region that may be left: see :meth:`.Landscape.escape`.
+    region : sequence or mapping, optional
+        Inequalities ``g >= 0`` that all hold in a region, which is left where one of them is 0: see
+        :meth:`.Landscape.escape`.  The landscape is the one of ``D`` in this region.
     symmetry : Symmetry, optional
         As for :func:`.stationary_points`.
     cap : float, optional
@@ -89,24 +92,32 @@ def landscape(
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
     limited = polyhedron.intersected(region)
-    exits = limited.names[len(polyhedron.functions) :]
+    exits = _exits(polyhedron, limited, region)
     walls, sides, notes = _walls(pose(limited, posed.energy), whole, symmetry, cap)
     bounded = limited.intersected(walls) if walls else limited
-    options: dict[str, Any] = {"box": sides, "resolution": resolution, "progress": progress}
+    options: dict[str, Any] = {"box": sides, "resolution": resolution}
     limits: dict[str, Any] = {
         "max_boxes": max_boxes,
         "max_seconds": max_seconds,
         "workers": workers,
     }
     found = critical_points(
-        bounded, posed.energy, symmetry=symmetry, cap=cap, limits=limits, **options
+        bounded,
+        posed.energy,
+        symmetry=symmetry,
+        cap=cap,
+        limits=Limits(**limits, progress=progress),
+        kept=exits,
+        **options,
     )
     ordered = Sorted(found, frozenset(exits), Curves(found.problem), cap)
     for name in exits:
         d = found.problem.polyhedron
         wall = d.functions[d.names.index(name)]
         on = d.intersected(equations=[wall], without=[name])
-        listed = stationary_points(on, posed.energy, minima_only=True, **options, **limits)
+        listed = stationary_points(
+            on, posed.energy, minima_only=True, progress=progress, **options, **limits
+        )
         ordered.leave(listed, name)
     passes = tuple(ordered.passes())
     return Landscape(
@@ -116,8 +127,39 @@ def landscape(
         True,
         float(cap),
         bool(exits),
-        (*notes, *dict.fromkeys(ordered.notes)),
+        (*notes, *_sections(whole)),
     )
+
+
+def _exits(polyhedron: Polyhedron, limited: Polyhedron, region: Any) -> tuple[str, ...]:
+    """Return the names of the inequalities of a region."""
+    given = region.values() if isinstance(region, Mapping) else region
+    several = given if isinstance(given, Iterable) else [given]
+    own = {id(f) for f in polyhedron.functions}
+    again = [part.name for part in several if id(part) in own]
+    if again:
+        checks.refuse("region", "inequalities that the polyhedron does not have", again[0])
+    names = limited.names[len(polyhedron.functions) :]
+    always, _ = limited.unions
+    inside = frozenset(limited.names[i] for i in always)
+    parted = [name for name in names if name not in inside]
+    if parted:
+        checks.refuse("region", "inequalities that all hold", f"a union with {parted[0]}")
+    return names
+
+
+def _sections(box: Domain) -> tuple[str, ...]:
+    """Return what is said of circles on which a coordinate is fixed."""
+    manifold = box.manifold
+    names = [manifold.names[i] for i in box.fixed if math.isfinite(manifold.periods[i])]
+    if not names:
+        return ()
+    given = ", ".join(f"{name} = {box.lower[manifold.names.index(name)]:g}" for name in names)
+    note = (
+        f"All is said of the section {given}: where an orbit of the symmetry meets it in several "
+        "points, these are told apart."
+    )
+    return (note,)
 
 
 def _walls(
@@ -135,7 +177,11 @@ def _walls(
         met = {(i, k) for i in lined for k in (0, 1)}  # the same ones at the images of each
     walls: dict[str, Any] = {}
     ends = zip(box.lower.tolist(), box.upper.tolist(), strict=True)
-    sides: list[Any] = [[a, b] if a < b else a for a, b in ends]
+    # Whole circles are rounded outwards, and None stands for them.
+    sides: list[Any] = [
+        None if b - a > period else [a, b] if a < b else a
+        for (a, b), period in zip(ends, manifold.periods, strict=True)
+    ]
     for i, k in sorted(met):
         name, value = manifold.names[i], float((box.lower, box.upper)[k][i])
         q = manifold.symbols[i]
@@ -143,9 +189,8 @@ def _walls(
         width = box.upper[i] - box.lower[i]
         more = min(BEYOND * width, 0.45 * (manifold.periods[i] - width))
         sides[i][k] += more if k else -more
-    whole = [None if i not in lined and i in box.free else side for i, side in enumerate(sides)]
     note = f"Sides of the box are walls: {', '.join(walls)}." if walls else ""
-    return walls, whole, (note,) if note else ()
+    return walls, sides, (note,) if note else ()
 
 
 def _misses(

@@ -100,7 +100,6 @@ class Sorted:
         self.nodes: list[Node] = []
         self.outside: list[Target] = []  # minima at the walls of a region that may be left
         self.candidates: list[Candidate] = []
-        self.notes: list[str] = []
         for point in found.points:
             self._sort(point)
         for box in found.undecided:
@@ -214,7 +213,7 @@ class Sorted:
 
     def _loci(self) -> None:
         """Sort loci, each connected component by itself."""
-        domain, d = self.found.domain, self.problem.polyhedron
+        domain = self.found.domain
         for number, place in enumerate(self.found.loci):
             z = list(place.z)
             lower, upper = domain.lower.copy(), domain.upper.copy()
@@ -226,11 +225,8 @@ class Sorted:
                 continue
             parts = components(self.problem, domain, z, lower, upper)
             if parts.open:
-                self.notes.append(
-                    "Whether points with "
-                    f"{', '.join(d.manifold.names[i] for i in z)} of a locus are connected is "
-                    "decided up to boxes that are left."
-                )
+                # Other components may be hidden in what is left, and some may be one.
+                self._undecided(lower, upper)
             for k, sample in enumerate(parts.samples):
                 low, high = sample.copy(), sample.copy()
                 low[z], high[z] = place.sharp_lower, place.sharp_upper

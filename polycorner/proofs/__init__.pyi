@@ -3,7 +3,7 @@ from .hypotheses import Status
 from .lists.corners import CornerList, CornerPoint, corners
 from .lists.critical import CriticalList, CriticalPoint, critical_points
 from .lists.domains import Domain, domain
-from .lists.enumeration import stationary_points
+from .lists.enumeration import Limits, stationary_points
 from .lists.images import Motion
 from .lists.stationary import StationaryList, StationaryLocus, StationaryPoint
 from .membership import Membership, Violation
@@ -17,6 +17,7 @@ __all__ = [
     "CriticalList",
     "CriticalPoint",
     "Domain",
+    "Limits",
     "Membership",
     "Motion",
     "ParameterCell",

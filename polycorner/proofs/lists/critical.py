@@ -26,15 +26,15 @@ an obstacle on the far side of which a ball is held.
 """
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from polycorner import checks
 from polycorner.interrupts import first_interrupt
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
-from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.enumeration import Limits, begun
 from polycorner.proofs.lists.images import Motion
@@ -104,20 +104,26 @@ def critical_points(
     energy: "Energy",
     *,
     box: Any,
+    limits: Limits,
     symmetry: Symmetry | None = None,
     cap: float = float("inf"),
     resolution: float = SEARCH.resolution,
-    limits: Mapping[str, Any] | None = None,
-    progress: Progress = silent,
+    kept: Sequence[str] = (),
 ) -> CriticalList:
-    """Return all critical points up to an energy; see :func:`.stationary_points`."""
+    """Return all critical points up to an energy; see :func:`.stationary_points`.
+
+    Raises ValueError if one of the functions ``kept`` is a multiple of another one.
+    """
     search = begun(
         StationarySearch, polyhedron, energy, box, symmetry, resolution, critical=True, cap=cap
     )
+    lost = [name for name in kept if name not in search.problem.polyhedron.names]
+    if lost:
+        expected = "inequalities that are no multiples of others"
+        checks.refuse("region", expected, lost[0])
     stop = threading.Event()
-    given = {"max_boxes": SEARCH.max_boxes, "max_seconds": float("inf"), "workers": 1}
     with first_interrupt(stop.set):
-        Limits(**{**given, **(limits or {})}, progress=progress).run(search, stop)
+        limits.run(search, stop)
     members = (member for _, member in settled(search)[0])
     points = [
         CriticalPoint(point_of(search, one, orbit), one.zeros, one.unknown, is_open)
