@@ -11,6 +11,7 @@ from the minimum reaches.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from polycorner.intervals.balls import ball, precision
 from polycorner.landscapes.components import Component
 from polycorner.landscapes.curves import BITS, Curves, Spot
 from polycorner.landscapes.routes import Route
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
 if TYPE_CHECKING:
@@ -252,13 +253,14 @@ class Descents:
                 if self.curves.straight(q, trial, ceiling, 2):
                     nearer = trial
             points.append(nearer)
-            q = nearer
+            # Functions of images in a periodic arrangement are meant near the principal interval.
+            q = self.manifold.wrap(nearer)
             step = min(self.options.longest, 1.7 * step)
         return None
 
     def _told(self, points: Sequence[Array], top: float) -> Route:
-        vertices = np.array(points)
-        energies = self.problem.energy.value(vertices)
+        vertices = unwound(self.manifold, np.array(points))
+        energies = self.problem.energy.value(np.array(points))
         return Route(vertices, np.asarray(energies, dtype=np.float64), top, True)
 
     def _arrived(
@@ -431,3 +433,9 @@ def _multipliers(metric: Array, g: Array, a: Array, jac: Array, d: Array) -> Arr
         return np.asarray(nnls(a.T, right)[0])
     except RuntimeError:
         return np.zeros(len(a))
+
+
+def unwound(manifold: Manifold, path: Array) -> Array:
+    """Return a path whose steps around circles are the short ones."""
+    steps = [manifold.difference(b, a) for a, b in pairwise(path)]
+    return np.vstack([path[:1], path[0] + np.cumsum(steps, axis=0)])

@@ -33,7 +33,7 @@ all the same.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,11 +42,11 @@ from scipy.optimize import linprog
 from polycorner.intervals.balls import ball, between, precision
 from polycorner.landscapes.components import components
 from polycorner.landscapes.curves import BITS, Curves, Spot
-from polycorner.landscapes.descents import Descents, Target
+from polycorner.landscapes.descents import Descents, Target, unwound
 from polycorner.landscapes.landscape import OUTSIDE, Bounds, Kind, Minimum, Pass, Side
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import CriticalList, CriticalPoint, StationaryList
-from polycorner.spaces.manifold import Array, Manifold
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
@@ -262,11 +262,11 @@ class Sorted:
             zeros = frozenset(d.names.index(name) for name in (*p.active, *p.redundant)) | {g}
             spot = self.spot(p.lower, p.upper, zeros)
             plain = p.index == 0 and not p.redundant and lam is not None
-            if lam is not None and plain and lam[0] > 0 and not d.is_union:
-                continue  # a minimum of the region itself, at its wall
             values = d.values(spot.middle)
             signs = [0 if i in zeros else int(np.sign(v)) for i, v in enumerate(values)]
             pieces = d.signs_to_pieces(signs)
+            if lam is not None and plain and lam[0] > 0 and len(pieces) == 1:
+                continue  # a minimum of the region itself, at its wall
             starts = []
             if lam is not None and lam[1] < 0:
                 ways = [(piece, self._into(spot, piece)) for piece in pieces]
@@ -381,12 +381,6 @@ class Sorted:
                     one.orbit,
                 )  # fmt: skip
         return None
-
-
-def unwound(manifold: Manifold, path: Array) -> Array:
-    """Return a path whose steps around circles are the short ones."""
-    steps = [manifold.difference(b, a) for a, b in pairwise(path)]
-    return np.vstack([path[:1], path[0] + np.cumsum(steps, axis=0)]) if steps else path
 
 
 def parted(active: frozenset[int], pieces: Sequence[Piece]) -> list[Piece]:

@@ -26,9 +26,11 @@ an obstacle on the far side of which a ball is held.
 """
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from polycorner import checks
 from polycorner.interrupts import first_interrupt
@@ -37,14 +39,14 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.enumeration import Limits, begun
-from polycorner.proofs.lists.images import Motion
+from polycorner.proofs.lists.images import Motion, expanded
 from polycorner.proofs.lists.listing import each, loci_of, point_of, undecided
 from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.members import settled
 from polycorner.proofs.lists.search import StationarySearch, Tally
 from polycorner.proofs.lists.stationary import StationaryPoint
 from polycorner.spaces.manifold import Array
-from polycorner.tolerances import SEARCH
+from polycorner.tolerances import DEFAULT, SEARCH
 from polycorner.values import Value
 
 if TYPE_CHECKING:
@@ -61,6 +63,8 @@ class CriticalPoint(Value):
         Its active functions have positive multipliers; ``index`` belongs to these alone.
     zeros, unknown : frozenset of int
         Inequalities that vanish there, and those that may.
+    around : ((n,) array, (n,) array)
+        A box in which it is the only KKT point of its active functions.
     is_open : bool
         Whether it is not decided that it is a point of the set, in the domain, and another one.
     """
@@ -68,6 +72,7 @@ class CriticalPoint(Value):
     point: StationaryPoint
     zeros: frozenset[int]
     unknown: frozenset[int]
+    around: tuple[Array, Array]
     is_open: bool
 
 
@@ -126,15 +131,75 @@ def critical_points(
         limits.run(search, stop)
     members = (member for _, member in settled(search)[0])
     points = [
-        CriticalPoint(point_of(search, one, orbit), one.zeros, one.unknown, is_open)
+        CriticalPoint(
+            point_of(search, one, orbit),
+            one.zeros,
+            one.unknown,
+            (one.region.lower, one.region.upper),
+            is_open,
+        )
         for one, orbit, is_open in each(search, members)
     ]
     return CriticalList(
         search.problem,
         search.domain,
-        tuple(points),
+        tuple(_once(search.problem, points)),
         tuple(loci_of(search)),
         undecided(search),
         tuple(search.motions),
         search.tally,
     )
+
+
+def _once(problem: Problem, points: list[CriticalPoint]) -> Iterator[CriticalPoint]:
+    """Yield points, those once that whole turns around circles carry to each other.
+
+    Functions that stand for images in a periodic arrangement change places with such a turn.
+    """
+    manifold = problem.polyhedron.manifold
+    kept: list[CriticalPoint] = []
+    middles = np.array([p.point.point for p in points]).reshape(-1, problem.dimension)
+    for k, one in enumerate(points):
+        near = abs(manifold.difference(middles[:k], middles[k])) / problem.scales
+        same = [
+            j for j in np.flatnonzero((near < DEFAULT.same).all(axis=1)).tolist()
+            if _is_turned(problem, points[j], one)
+        ]  # fmt: skip
+        if not same:
+            kept.append(one)
+    yield from kept
+
+
+def _is_turned(problem: Problem, one: CriticalPoint, other: CriticalPoint) -> bool:
+    """Whether a point is shown to be another one, carried around circles by whole turns."""
+    import sympy
+
+    manifold = problem.polyhedron.manifold
+    periods = np.array(manifold.periods)
+    circle = np.isfinite(periods)
+    turns = np.zeros(len(periods))
+    turns[circle] = np.rint((other.point.point - one.point.point)[circle] / periods[circle])
+    if not turns.any() or len(one.point.active) != len(other.point.active):
+        return False
+    back = other.point.lower - turns * np.where(circle, periods, 0.0)
+    ahead = other.point.upper - turns * np.where(circle, periods, 0.0)
+    slack = 4 * np.spacing(abs(back) + abs(ahead))
+    lower, upper = one.around
+    if not ((back - slack >= lower) & (ahead + slack <= upper) | (lower == upper)).all():
+        return False
+    symbols = manifold.symbols
+    moved = {
+        symbols[i]: symbols[i] + sympy.Rational(turns[i] * periods[i])
+        for i in np.flatnonzero(turns).tolist()
+    }
+    d = problem.polyhedron
+    here = [expanded(d.functions[d.names.index(name)]) for name in one.point.active]
+    there = [
+        sympy.expand(expanded(d.functions[d.names.index(name)]).subs(moved, simultaneous=True))
+        for name in other.point.active
+    ]
+    energy = expanded(problem.energy)
+    if sympy.expand(energy.subs(moved, simultaneous=True) - energy) != 0:
+        return False
+    # One for one: the same functions, so that both solve the same equations.
+    return all(any(sympy.expand(f - g) == 0 for g in there) for f in here)
