@@ -101,7 +101,11 @@ class Sorted:
         self.outside: list[Target] = []  # minima at the walls of a region that may be left
         self.candidates: list[Candidate] = []
         for point in found.points:
-            self._sort(point)
+            if (
+                bounds_of(room, self.spot(point.point.lower, point.point.upper, frozenset()))[0]
+                <= cap
+            ):
+                self._sort(point)
         for box in found.undecided:
             self._undecided(box[0], box[1])
         self._loci()

@@ -66,6 +66,10 @@ class Domain(Value):
         away = (upper < self.lower[at]) | (lower > self.upper[at])
         return bool((away & ~whole).any())
 
+    def is_beyond(self, lower: Array, upper: Array) -> bool:
+        """Whether a box lies outside where it is, not carried around circles."""
+        return bool(((upper < self.lower) | (lower > self.upper)).any())
+
     def holds(self, lower: Array, upper: Array, room: float = 0.0) -> bool:
         """Whether a box in all coordinates lies inside, circles that are whole apart.
 

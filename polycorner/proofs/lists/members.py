@@ -129,7 +129,9 @@ def settled(search: BoxSearch) -> tuple[list[tuple[int, Member]], dict[int, Arra
     """
     seen, members, ways = Listed(search), list[tuple[int, Member]](), dict[int, Array]()
     for k, region in enumerate(search.regions):
-        member = None if seen.holds(region) else judged(search, region)
+        # A point beyond the end of a circle is in the box, too, carried around it, and found there.
+        beyond = search.critical and search.domain.is_beyond(*full(search, region))
+        member = None if beyond or seen.holds(region) else judged(search, region)
         if member is not None and search.minima_only and region.index != 0:
             plain = region.index is not None and member.free  # no others can make it a minimum
             way = None if plain or member.place == OUT else _bent(search, member)
