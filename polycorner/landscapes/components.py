@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.minimisation.problem import Problem
-from polycorner.proofs import Domain
+from polycorner.proofs.lists.domains import Domain
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH
 from polycorner.values import Value

@@ -36,7 +36,7 @@ from polycorner.landscapes.routes import Route
 from polycorner.minimisation.problem import Problem
 from polycorner.printing import number
 from polycorner.progress import Progress, silent
-from polycorner.proofs import domain
+from polycorner.proofs.lists.domains import domain
 from polycorner.proofs.symbols import Symbols, evaluate, opened
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH

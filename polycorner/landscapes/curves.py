@@ -149,7 +149,11 @@ class Curves:
             if not self.problem.polyhedron.implicit_of(lows) >= 0:
                 return None
             end = self._end(start, rows, frame, along, length, y, rho, held)
-            return end and replace(end, top=float(self.value(hull).upper()))
+            if end is None or not all(
+                float(x.rad()) <= off / 2 for x, off in zip(end.box, self.off, strict=True)
+            ):
+                return None
+            return replace(end, top=above(self.value(hull)))
 
     def _frame(self, q: Array, rows: Sequence[int]) -> Array | None:
         """Return ``N``, ``(n, k)``, with ``f_H' N`` near the unit matrix."""
@@ -307,10 +311,13 @@ class Curves:
         slack = [ball(0, x) for x in (self.off + 8 * np.spacing(abs(a))).tolist()]
         ends = [[ball(x) + s for x, s in zip(q.tolist(), slack, strict=True)] for q in (a, b)]
         hull = [x.union(y) for x, y in zip(*ends, strict=True)]
-        step = [ball(y) - ball(x) for x, y in zip(a.tolist(), b.tolist(), strict=True)]
+        # Ends may move by the slack, each for itself; along equations both by the same.
+        step = [y - x for x, y in zip(*ends, strict=True)]
+        if self.equations:
+            step = [ball(y) - ball(x) for x, y in zip(a.tolist(), b.tolist(), strict=True)]
         tube: list[list[Ball]] = []  # the columns of N times rho
         if self.equations:
-            found = self._tube(a, ends, hull, step)
+            found = self._tube(a, b, ends, hull, step)
             if found is None:
                 return False
             tube = found
@@ -338,7 +345,12 @@ class Curves:
         return bool(top < ceiling)
 
     def _tube(
-        self, a: Array, ends: "list[list[Ball]]", hull: "list[Ball]", step: "list[Ball]"
+        self,
+        a: Array,
+        b: Array,
+        ends: "list[list[Ball]]",
+        hull: "list[Ball]",
+        step: "list[Ball]",
     ) -> "list[list[Ball]] | None":
         """Return the columns of ``N`` times ``[-rho, rho]``, or None if that is not shown."""
         rows = self.equations
@@ -353,6 +365,15 @@ class Curves:
         bends = [
             dot(step, [dot(line, step) for line in h]) for h in forms.evaluate(Box(hull), 2)[2]
         ]
+        # The solutions at the ends, so near to the vertices that pieces join.
+        for vertex in (a, b):
+            found = self.formulas.values(Box([ball(x) for x in vertex.tolist()]), rows)
+            sizes = [2 * abs(x).upper() for x in found]
+            if not all(
+                dot(sizes, [abs(c[i]) for c in columns]) <= off
+                for i, off in enumerate(self.off.tolist())
+            ):
+                return None
         # Values along the straight piece, then reaches that are larger by far.
         flat = [
             abs(x).upper() + abs(y).upper() + abs(s).upper() / 8
@@ -393,3 +414,14 @@ def _least(a: "Ball", b: "Ball", bend: "Ball") -> "Ball":
     if not s > 0 or abs(b - a) >= s / 2:
         return lesser.lower()
     return ((a + b) / 2 - s / 8 - square(b - a) / (2 * s)).lower()
+
+
+def above(x: "Ball") -> float:
+    """Return a double that is not below a ball."""
+    high = float(x.upper())
+    return high if ball(high) >= x.upper() else float(np.nextafter(high, np.inf))
+
+
+def under(x: "Ball") -> float:
+    """Return a double that is not above a ball."""
+    return -above(-x)

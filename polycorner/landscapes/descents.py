@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 
 from polycorner.intervals.balls import ball, precision
 from polycorner.landscapes.components import Component
-from polycorner.landscapes.curves import BITS, Curves, Spot
+from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.routes import Route
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
@@ -102,7 +102,7 @@ class Descents:
         """Return a minimum with points above it."""
         with precision(BITS):
             energy = self.curves.value(spot.box)
-            top = float(energy.upper())
+            top = above(energy)
         lifted: list[Spot] = []
         if spot.zeros:
             into = self.into(spot.middle, spot.zeros)
@@ -224,8 +224,8 @@ class Descents:
         """
         with precision(BITS):
             height = self.curves.value(start.box)
-            ceiling, top = height.lower(), float(height.upper())
-        below = float(ceiling)
+            ceiling, top = height.lower(), above(height)
+            below = under(height)
         points = [start.middle, *(spot.middle for spot in begun)]
         q, step = begun[-1].middle, self.options.first
         rng, stalled = np.random.default_rng(0), 0
@@ -233,7 +233,7 @@ class Descents:
             found = self._arrived(q, step, targets, ceiling, below, eager=count % 5 == 0)
             if found is not None:
                 number, ways = found
-                return number, self._told([*points, *ways], float(np.nextafter(top, np.inf)))
+                return number, self._told([*points, *ways], top)
             moved = self._moved(q, step, below, ceiling)
             if moved is None:
                 step /= 4

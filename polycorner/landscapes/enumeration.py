@@ -2,20 +2,25 @@
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner import checks
+from polycorner.interrupts import first_interrupt
 from polycorner.intervals.boxes import BoxFunctions
+from polycorner.landscapes.convex import convex_landscape
 from polycorner.landscapes.curves import Curves
 from polycorner.landscapes.landscape import Landscape
 from polycorner.landscapes.passes import Sorted
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra import Polyhedron, Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.proofs import Domain, Limits, critical_points, domain, stationary_points
+from polycorner.proofs.lists.critical import critical_points, minima_on
+from polycorner.proofs.lists.domains import Domain, domain
+from polycorner.proofs.lists.enumeration import Limits
 from polycorner.tolerances import SEARCH
 
 if TYPE_CHECKING:
@@ -86,7 +91,7 @@ def landscape(
     (True, 2, 1)
     >>> found.barrier(1, 0).rise
     """
-    checks.real("cap", cap, infinite=True)
+    checks.real("cap", cap, above=-inf, infinite=True)
     posed = pose(polyhedron, energy)
     whole = domain(polyhedron.manifold, box)
     if symmetry is not None:
@@ -95,31 +100,24 @@ def landscape(
     exits = _exits(polyhedron, limited, region)
     walls, sides, notes = _walls(pose(limited, posed.energy), whole, symmetry, cap)
     bounded = limited.intersected(walls) if walls else limited
-    options: dict[str, Any] = {"box": sides, "resolution": resolution}
-    limits: dict[str, Any] = {
-        "max_boxes": max_boxes,
-        "max_seconds": max_seconds,
-        "workers": workers,
-    }
-    found = critical_points(
-        bounded,
-        posed.energy,
-        symmetry=symmetry,
-        cap=cap,
-        limits=Limits(**limits, progress=progress),
-        kept=exits,
-        **options,
-    )
-    ordered = Sorted(found, frozenset(exits), Curves(found.problem), cap)
-    for name in exits:
-        d = found.problem.polyhedron
-        wall = d.functions[d.names.index(name)]
-        on = d.intersected(equations=[wall], without=[name])
-        listed = stationary_points(
-            on, posed.energy, minima_only=True, progress=progress, **options, **limits
-        )
-        ordered.leave(listed, name)
-    passes = tuple(ordered.passes())
+    if not exits and symmetry is None:
+        flat = convex_landscape(
+            pose(bounded, posed.energy), box=sides, cap=cap, max_seconds=max_seconds,
+            progress=progress,
+        )  # fmt: skip
+        if flat is not None:
+            return replace(flat, problem=posed, notes=(*notes, *flat.notes))
+    options: dict[str, Any] = {"box": sides, "resolution": resolution, "cap": cap}
+    options["limits"] = limits = Limits(max_boxes, max_seconds, workers, progress)
+    with first_interrupt(limits.stop.set):
+        found = critical_points(bounded, posed.energy, symmetry=symmetry, kept=exits, **options)
+        ordered = Sorted(found, frozenset(exits), Curves(found.problem), cap)
+        for name in exits:
+            d = found.problem.polyhedron
+            wall = d.functions[d.names.index(name)]
+            on = d.intersected(equations=[wall], without=[name])
+            ordered.leave(minima_on(on, posed.energy, **options), name)
+        passes = tuple(ordered.passes(limits.stop.is_set))
     return Landscape(
         posed,
         tuple(node.minimum for node in ordered.nodes),

@@ -5,7 +5,7 @@ merge at passes alone (:mod:`~polycorner.landscapes.passes`).  The *barrier* bet
 the least ``c`` for which they are in one component of ``D_c``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite, nextafter
 from typing import Literal
@@ -18,6 +18,7 @@ from polycorner.landscapes.routes import Route
 from polycorner.minimisation.problem import Problem
 from polycorner.printing import Printed, Sheet, Table, facts, number, units
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, cached_property
 
 OUTSIDE = -1  # the node beyond the region that may be left
@@ -56,7 +57,8 @@ class Side(Checked):
     Attributes
     ----------
     minimum : int or None
-        The number of the minimum; -1 for the outside of the region; None where none is known.
+        The number of the minimum; -1 for the outside of the region, and less for minima on its
+        walls, each with a number of its own; None where none is known.
     route : Route or None
         From the pass to the minimum.
     """
@@ -197,35 +199,40 @@ class Landscape(Checked, Printed):
 
     # ------------------------------------------------------------------------------------ barriers
 
-    @cached_property
-    def _lower(self) -> Forest:
-        """Links wherever there may be one, by lower bounds."""
-        every, links = range(self._count), []
-        for k, p in enumerate(self.passes):
-            known = p.sides and all(side.verified for side in p.sides)
-            nodes = [self._node(s.minimum) for s in p.sides] if known else every
-            links.append(Link(tuple(nodes), p.energy[0], k))
-        return Forest(self._count, links)
+    def _nodes(self, leaving: bool) -> dict[int, int]:
+        """Return the nodes of minima, also of those on walls of the region, by their numbers."""
+        count = len(self.minima)
+        walls = {s.minimum for p in self.passes for s in p.sides if (s.minimum or 0) < 0}
+        if leaving:
+            return dict.fromkeys([*walls, OUTSIDE], count) | {k: k for k in range(count)}
+        # Two ways out need not meet outside, which is no way from minimum to minimum.
+        return {k: i for i, k in enumerate([*range(count), *sorted(walls - {OUTSIDE})])}
 
-    @cached_property
-    def _upper(self) -> Forest:
-        """Links along routes, the verified ones of a proof alone, by upper bounds."""
-        links = []
+    def _forest(self, *, lower: bool, leaving: bool) -> Forest:
+        """Return links by lower bounds, wherever there may be one; or those that are shown."""
+        nodes, links = self._nodes(leaving), []
+        every = tuple(sorted(set(nodes.values())))
         for k, p in enumerate(self.passes):
-            sides = [s for s in p.sides if s.minimum is not None]
-            if self.proved:
-                sides = [s for s in sides if s.verified]
+            known = self._is_known(p)
+            sides = [s for s in p.sides if known or s.verified or not (lower or self.proved)]
             tops = [s.route.top for s in sides if s.route] if p.kind != "exit" else []
-            top = max([p.energy[1], *tops])
-            links.append(Link(tuple([self._node(s.minimum) for s in sides]), top, k))
-        return Forest(self._count, links)
+            weight = p.energy[0] if lower else max([p.energy[1], *tops])
+            ends = tuple(nodes[s.minimum] for s in sides if s.minimum in nodes)
+            links.append(Link(every if lower and not known else ends, weight, k))
+        return Forest(len(every), links)
 
-    @property
-    def _count(self) -> int:
-        return len(self.minima) + self.region
+    @cached_property
+    def _lower(self) -> dict[bool, Forest]:
+        """By whether the question is one of leaving the region."""
+        return {leaving: self._forest(lower=True, leaving=leaving) for leaving in (False, True)}
 
-    def _node(self, minimum: int | None) -> int:
-        return len(self.minima) if minimum == OUTSIDE else int(minimum or 0)
+    @cached_property
+    def _upper(self) -> dict[bool, Forest]:
+        return {leaving: self._forest(lower=False, leaving=leaving) for leaving in (False, True)}
+
+    def _is_known(self, p: Pass) -> bool:
+        """Whether it is proved what a pass joins."""
+        return bool(p.sides) and all(side.verified for side in p.sides)
 
     def barrier(self, start: int, end: int) -> Barrier:
         """Return the least energy at which two minima are in one component, between two bounds.
@@ -245,39 +252,47 @@ class Landscape(Checked, Printed):
         return self._barrier(start, end)
 
     def _barrier(self, start: int, end: int) -> Barrier:
-        a, b = start, self._node(end)
+        leaving = end == OUTSIDE
         ends = [self.minima[k].energy for k in (start, end) if k != OUTSIDE]
-        lower = max(min(self._lower.bottleneck(a, b), self.cap), *(low for low, _ in ends))
-        upper, way = self._upper.bottleneck(a, b), self._upper.path(a, b) or ()
+        target = len(self.minima) if leaving else end
+        lower = min(self._lower[leaving].bottleneck(start, target), self.cap)
+        lower = max(lower, *(low for low, _ in ends))
+        shown = self._upper[leaving]
+        upper, way = shown.bottleneck(start, target), shown.path(start, target) or ()
         upper = max(upper, *(high for _, high in ends))
         low, high = self.minima[start].energy
         rise = max(below(lower, high), 0.0), above(upper, low)
         used = tuple(link.source for _, _, link in way)
-        route = self._route(way)
+        route = self._route(way, self._nodes(leaving))
         return Barrier(start, end, lower, upper, rise, used, self.proved, route)
 
-    def _route(self, way: Sequence[tuple[int, int, Link]]) -> Route | None:
+    def _route(
+        self, way: Sequence[tuple[int, int, Link]], nodes: Mapping[int | None, int]
+    ) -> Route | None:
         """Return the ways down to both sides of the passes on a way, joined."""
         parts: list[tuple[Route, bool]] = []
         for a, b, link in way:
-            sides = {self._node(s.minimum): s.route for s in self.passes[link.source].sides}
-            for node, backwards in ((a, True), (b, False)):
-                route = sides.get(node)
-                if route is not None:
-                    parts.append((route, backwards))
+            routes = {
+                nodes[s.minimum]: s.route
+                for s in self.passes[link.source].sides
+                if s.minimum in nodes and s.route is not None
+            }
+            parts += [(routes[c], back) for c, back in ((a, True), (b, False)) if c in routes]
         if not parts:
             return None
-        points = np.concatenate([r.vertices[::-1] if back else r.vertices for r, back in parts])
+        manifold = self.problem.polyhedron.manifold
+        points, together = [np.zeros((0, manifold.dimension))], True
+        for route, back in parts:
+            part = route.vertices[::-1] if back else route.vertices
+            if len(points) > 1:
+                # Parts end where the next begins up to whole turns; on loci perhaps elsewhere.
+                apart = manifold.difference(points[-1][-1], part[0])
+                part = part + (points[-1][-1] - part[0] - apart)
+                together &= bool((abs(apart) <= DEFAULT.alike * self.problem.scales).all())
+            points.append(part)
         heights = np.concatenate([r.energies[::-1] if back else r.energies for r, back in parts])
-        period = np.array(self.problem.polyhedron.manifold.periods)
-        finite = np.isfinite(period)
-        # Parts end where the next begins up to whole turns, which are unrolled.
-        steps = np.diff(points, axis=0)
-        turns = np.zeros_like(steps)
-        turns[:, finite] = np.rint(steps[:, finite] / period[finite]) * period[finite]
-        points = points - np.vstack([np.zeros(points.shape[1]), np.cumsum(turns, axis=0)])
-        tops = [route.top for route, _ in parts]
-        return Route(points, heights, max(tops), all(route.verified for route, _ in parts))
+        verified = together and all(route.verified for route, _ in parts)
+        return Route(np.concatenate(points), heights, max(r.top for r, _ in parts), verified)
 
     def escape(self, start: int) -> Barrier:
         """Return the least energy at which the region can be left from a minimum.
@@ -303,7 +318,8 @@ class Landscape(Checked, Printed):
     def depth(self, start: int) -> Bounds:
         """Return bounds of the least rise after which a minimum is joined to one not higher.
 
-        Infinite for a lowest minimum without an equal.
+        Infinite for a lowest minimum without an equal.  Of a region that may be left, points on its
+        wall are not among the minima.
 
         Parameters
         ----------
@@ -317,7 +333,9 @@ class Landscape(Checked, Printed):
         """
         checks.whole("start", start, least=0, most=len(self.minima) - 1)
         one = self.minima[start]
-        low, high = inf, inf
+        # What is not decided may hide a minimum as low as its energy, and so may all above the cap.
+        hidden = [self.cap, *(p.energy[0] for p in self.passes if not self._is_known(p))]
+        low, high = (0.0 if min(hidden) <= one.energy[1] else inf), inf
         for k, other in enumerate(self.minima):
             if k == start:
                 continue
@@ -332,8 +350,8 @@ class Landscape(Checked, Printed):
     def merges(self) -> tuple[Merge, ...]:
         """Where components merge, the lowest first."""
         found = []
-        for one in self._upper.joins:
-            if max(one.first, one.second) < len(self.minima):
+        for one in self._upper[False].joins:
+            if one.second < len(self.minima):
                 p = self.passes[one.link.source]
                 energy = p.energy[0], max(p.energy[1], one.link.weight)
                 found.append(Merge(one.link.source, energy, one.first, one.second))
@@ -341,18 +359,18 @@ class Landscape(Checked, Printed):
 
     @cached_property
     def loops(self) -> tuple[int, ...]:
-        """The passes whose sides are joined below them already."""
-        used = {one.link.source for one in self._upper.joins}
-        known = (k for k, p in enumerate(self.passes) if p.sides and p.kind != "undecided")
-        return tuple(k for k in known if k not in used)
+        """The passes whose sides are all known, and joined below them already."""
+        used = {one.link.source for one in self._upper[False].joins}
+        known = [
+            k for k, p in enumerate(self.passes)
+            if p.sides and all(side.minimum is not None for side in p.sides)
+        ]  # fmt: skip
+        return tuple(k for k in known if k not in used and self.passes[k].kind != "exit")
 
     @property
     def complete(self) -> bool:
         """Whether it is proved that the tree is the one of all minima and passes below ``cap``."""
-        return self.proved and all(
-            p.kind != "undecided" and p.sides and all(s.verified for s in p.sides)
-            for p in self.passes
-        )
+        return self.proved and all(p.kind != "undecided" and self._is_known(p) for p in self.passes)
 
     # ------------------------------------------------------------------------------------- printed
 
@@ -404,4 +422,4 @@ def _held(active: tuple[str, ...]) -> str:
 
 
 def _label(minimum: int) -> str:
-    return "outside" if minimum == OUTSIDE else str(minimum)
+    return "outside" if minimum < 0 else str(minimum)

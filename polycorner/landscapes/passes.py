@@ -31,7 +31,7 @@ undecided, is taken to join everything, from the least energy it may have: bound
 all the same.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -39,18 +39,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, between, precision
+from polycorner.intervals.balls import between, precision
+from polycorner.intervals.boxes import BoxFunctions
+from polycorner.intervals.tapes import Box
 from polycorner.landscapes.components import components
-from polycorner.landscapes.curves import BITS, Curves, Spot
+from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.descents import Descents, Target, unwound
 from polycorner.landscapes.landscape import OUTSIDE, Bounds, Kind, Minimum, Pass, Side
 from polycorner.polyhedra.polyhedron import Piece
-from polycorner.proofs import CriticalList, CriticalPoint, StationaryList
+from polycorner.proofs import StationaryList
+from polycorner.proofs.lists.critical import CriticalList, CriticalPoint
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
-    from polycorner.proofs import Motion
+    from polycorner.proofs.lists.images import Motion
 
 
 @dataclass
@@ -95,7 +98,8 @@ class Sorted:
         self, found: CriticalList, exits: frozenset[str], room: Curves, cap: float
     ) -> None:
         self.found, self.problem, self.exits = found, found.problem, exits
-        self.curves, self.cap = room, cap
+        self.curves = room
+        self.functions = BoxFunctions(found.problem.functions, found.problem.polyhedron.manifold)
         self.descents = Descents(room, found.domain.free)
         self.nodes: list[Node] = []
         self.outside: list[Target] = []  # minima at the walls of a region that may be left
@@ -125,12 +129,11 @@ class Sorted:
     def _sort(self, one: CriticalPoint) -> None:
         p, d = one.point, self.problem.polyhedron
         spot = self.spot(p.lower, p.upper, one.zeros)
-        values = d.values(spot.middle)
-        signs = [0 if i in one.zeros else int(np.sign(v)) for i, v in enumerate(values)]
+        signs = self._signs(spot)
         held = frozenset(d.names.index(name) for name in p.active)
-        pieces = d.signs_to_pieces(signs)
+        pieces = d.signs_to_pieces(signs or [])
         matter = frozenset().union(*pieces) if pieces else frozenset()
-        if one.is_open or one.unknown:
+        if one.is_open or one.unknown or signs is None:
             self._undecided(p.lower, p.upper, p.active, p.orbit)
         elif len(pieces) == 1 and p.index == 0 and pieces[0] >= held:
             self._minimum(spot, p.active, p.orbit)
@@ -138,6 +141,27 @@ class Sorted:
             self._undecided(p.lower, p.upper, p.active, p.orbit)
         elif matter == held:
             self._regular(spot, one, held, pieces)
+
+    def _signs(self, spot: Spot) -> list[int] | None:
+        """Return the signs of all inequalities at a point, None if one is not decided."""
+        low, high = self.functions.values(
+            *(np.array([[f(x) for x in spot.box]]) for f in (under, above))
+        )
+        with precision(BITS):
+            values = self.curves.formulas.values(
+                Box(list(spot.box)), range(self.problem.inequalities)
+            )
+            signs = [
+                0
+                if i in spot.zeros
+                else 1
+                if v > 0 or low[0, i] > 0
+                else -1
+                if v < 0 or high[0, i] < 0
+                else None
+                for i, v in enumerate(values)
+            ]
+        return None if None in signs else [sign or 0 for sign in signs]
 
     def _regular(
         self, spot: Spot, one: CriticalPoint, held: frozenset[int], pieces: Sequence[Piece]
@@ -266,9 +290,8 @@ class Sorted:
             zeros = frozenset(d.names.index(name) for name in (*p.active, *p.redundant)) | {g}
             spot = self.spot(p.lower, p.upper, zeros)
             plain = p.index == 0 and not p.redundant and lam is not None
-            values = d.values(spot.middle)
-            signs = [0 if i in zeros else int(np.sign(v)) for i, v in enumerate(values)]
-            pieces = d.signs_to_pieces(signs)
+            signs = self._signs(spot)
+            pieces = [] if signs is None else d.signs_to_pieces(signs)
             if lam is not None and plain and lam[0] > 0 and len(pieces) == 1:
                 continue  # a minimum of the region itself, at its wall
             starts = []
@@ -295,8 +318,11 @@ class Sorted:
 
     # ------------------------------------------------------------------------------------- sides
 
-    def passes(self) -> Iterator[Pass]:
-        """Yield the passes, with their sides followed down, each orbit once and carried along."""
+    def passes(self, stopped: Callable[[], bool]) -> Iterator[Pass]:
+        """Yield the passes, with their sides followed down, each orbit once and carried along.
+
+        Sides are not known any more once ``stopped`` is true.
+        """
         self.nodes.sort(key=lambda node: node.minimum.energy)
         targets = [*(node.target for node in self.nodes), *self.outside]
         motions = [(g, self._permutation(g)) for g in self.found.motions]
@@ -307,7 +333,13 @@ class Sorted:
             if image is not None:
                 yield image
                 continue
-            sides = [*one.sides, *(self._side(one, start, targets) for start in one.starts)]
+            sides = [
+                *one.sides,
+                *(
+                    Side(None) if stopped() else self._side(one, start, targets)
+                    for start in one.starts
+                ),
+            ]
             if one.kind == "exit" and not one.starts:
                 sides = []
             new = Pass(
@@ -336,7 +368,7 @@ class Sorted:
             return Side(None)
         number, route = found
         if number >= len(self.nodes):
-            return Side(OUTSIDE, route)
+            return Side(OUTSIDE - 1 - number + len(self.nodes), route)
         return Side(number, route)
 
     def _permutation(self, g: "Motion") -> list[int | None]:
@@ -372,10 +404,11 @@ class Sorted:
             if (apart / self.problem.scales).max() < DEFAULT.same:
                 sides = []
                 for side in first.sides:
-                    if side.minimum is None or side.route is None or side.minimum < 0:
+                    if side.minimum is None or side.route is None:
                         sides.append(side)
                         continue
-                    there = moved[side.minimum]
+                    # Where minima on walls go is not asked: such sides are followed once more.
+                    there = None if side.minimum < 0 else moved[side.minimum]
                     if there is None:
                         return None
                     path = np.array([g(q, manifold) for q in side.route.vertices])
@@ -408,8 +441,4 @@ def bounds_of(curves: Curves, spot: Spot) -> Bounds:
         value = curves.value(spot.box)
         if not value.is_finite():
             return -np.inf, np.inf
-        low, high = float(value.lower()), float(value.upper())
-        # Conversion rounds to nearest.
-        low = low if ball(low) <= value.lower() else float(np.nextafter(low, -np.inf))
-        high = high if ball(high) >= value.upper() else float(np.nextafter(high, np.inf))
-    return low, high
+        return under(value), above(value)

@@ -1,6 +1,5 @@
 """Lists of all corners of a polyhedron in a box, and what is proved."""
 
-import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -351,9 +350,9 @@ def corners(
     checks.instance("polyhedron", polyhedron, Polyhedron)
     nothing = sympy.Integer(0)
     search = begun(CornerSearch, polyhedron, nothing, box, symmetry, resolution)
-    limits, stop = Limits(max_boxes, max_seconds, workers, progress), threading.Event()
-    with first_interrupt(stop.set):
-        limits.run(search, stop)
+    limits = Limits(max_boxes, max_seconds, workers, progress)
+    with first_interrupt(limits.stop.set):
+        limits.run(search)
     return listed(search)
 
 

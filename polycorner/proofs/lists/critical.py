@@ -25,7 +25,6 @@ Of an intersection critical points are the stationary ones.  A union has others,
 an obstacle on the far side of which a ball is held.
 """
 
-import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -33,18 +32,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner import checks
-from polycorner.interrupts import first_interrupt
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.enumeration import Limits, begun
 from polycorner.proofs.lists.images import Motion, expanded
-from polycorner.proofs.lists.listing import each, loci_of, point_of, undecided
+from polycorner.proofs.lists.listing import each, listed, loci_of, point_of, undecided
 from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.members import settled
 from polycorner.proofs.lists.search import StationarySearch, Tally
-from polycorner.proofs.lists.stationary import StationaryPoint
+from polycorner.proofs.lists.stationary import StationaryList, StationaryPoint
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, SEARCH
 from polycorner.values import Value
@@ -126,9 +124,7 @@ def critical_points(
     if lost:
         expected = "inequalities that are no multiples of others"
         checks.refuse("region", expected, lost[0])
-    stop = threading.Event()
-    with first_interrupt(stop.set):
-        limits.run(search, stop)
+    limits.run(search)
     members = (member for _, member in settled(search)[0])
     points = [
         CriticalPoint(
@@ -149,6 +145,22 @@ def critical_points(
         tuple(search.motions),
         search.tally,
     )
+
+
+def minima_on(
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    *,
+    box: Any,
+    limits: Limits,
+    cap: float,
+    resolution: float = SEARCH.resolution,
+) -> StationaryList:
+    """Return all local minima up to an energy."""
+    about = polyhedron, energy, box, None, resolution
+    search = begun(StationarySearch, *about, minima_only=True, cap=cap)
+    limits.run(search)
+    return listed(search, search.problem)
 
 
 def _once(problem: Problem, points: list[CriticalPoint]) -> Iterator[CriticalPoint]:

@@ -20,7 +20,7 @@ loci are those of the coordinates, at each value of the parameters.
 import math
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -288,8 +288,8 @@ def stationary_points(
         raise ValueError(msg)
     limits = Limits(max_boxes, max_seconds, workers, progress)
 
-    searches, stop = [], threading.Event()
-    with first_interrupt(stop.set):
+    searches = []
+    with first_interrupt(limits.stop.set):
         for k, part in enumerate(branches.parts):
             search = question.begun(StationarySearch, part, minima_only=minima_only)
             searches.append(search)
@@ -297,7 +297,7 @@ def stationary_points(
             folder = store if store is None or not several else Path(store) / f"piece_{k}"
             kept = None if folder is None else SearchStore(folder, search)
             try:
-                limits.run(search, stop, kept)
+                limits.run(search, kept)
             finally:
                 if kept:
                     kept.close()
@@ -313,6 +313,7 @@ class Limits:
     max_seconds: float
     workers: int
     progress: Progress
+    stop: threading.Event = field(default_factory=threading.Event)
 
     def __post_init__(self) -> None:
         checks.whole("max_boxes", self.max_boxes, least=1)
@@ -322,9 +323,7 @@ class Limits:
             expected = "a function (done, total, note)"
             checks.refuse("progress", expected, self.progress, TypeError)
 
-    def run(
-        self, search: BoxSearch, stop: threading.Event, kept: SearchStore | None = None
-    ) -> None:
+    def run(self, search: BoxSearch, kept: SearchStore | None = None) -> None:
         """Run a search to its end, saving it by the clock."""
 
         def report() -> None:
@@ -334,7 +333,7 @@ class Limits:
             self.progress(float(search.tally.boxes), None, note)
 
         limits = self.max_boxes, self.max_seconds
-        search.run(*limits, report, workers=self.workers, stopped=stop.is_set)
+        search.run(*limits, report, workers=self.workers, stopped=self.stop.is_set)
         if kept:
             kept.save()
 

@@ -277,7 +277,10 @@ def _turn(q: Array, manifold: Manifold) -> Array:
     """Return the multiples of periods that bring a point into the principal intervals."""
     periods = np.array(manifold.periods)
     whole = np.where(np.isfinite(periods), periods, 1.0)
-    return np.asarray(np.round((manifold.wrap(q) - q) / whole) * whole)
+    turn = np.round((manifold.wrap(q) - q) / whole) * whole
+    # At the end of the interval a point stays: functions need not be the same at the other one.
+    slack = ROUNDING * manifold.scale_array
+    return np.asarray(np.where(abs(q) <= 0.5 * periods + slack, 0.0, turn))
 
 
 def _shifted(lower: Array, upper: Array, shift: Array) -> tuple[Array, Array]:
