@@ -30,7 +30,7 @@ from polycorner import checks
 from polycorner.formulas.ranges import outward
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.enclosures import Formulas
-from polycorner.landscapes.landscape import Landscape, Minimum, Pass, Side
+from polycorner.landscapes.barriers import Landscape, Minimum, Pass, Side
 from polycorner.landscapes.programmes import Dictionary, Point, Programmes
 from polycorner.landscapes.routes import Route
 from polycorner.minimisation.problem import Problem

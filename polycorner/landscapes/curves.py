@@ -175,7 +175,9 @@ class Curves:
             y -= step
         sizes = abs(frame).max(axis=0, initial=0.0)
         least = DEFAULT.rounding * self.problem.scales.max() / np.where(sizes > 0, sizes, 1.0)
-        return y, (4.0 * abs(y) + least).tolist()
+        # One component may be small by chance at the end: bounds of all depend on the largest.
+        widest = (abs(y) * sizes).max(initial=0.0) / np.where(sizes > 0, sizes, 1.0)
+        return y, (4.0 * widest + least).tolist()
 
     def _tangent(
         self,

@@ -297,7 +297,7 @@ class Descents:
         near = q - turn
         if target.part:
             near[target.along] = q[target.along]
-            return [target.part.nearest(near)]
+            return target.part.way(near)
         end = target.spot.middle + (near - lifted)
         return [near] if (lifted == target.spot.middle).all() else [near, end]
 

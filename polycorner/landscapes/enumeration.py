@@ -11,9 +11,9 @@ import numpy as np
 from polycorner import checks
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.boxes import BoxFunctions
+from polycorner.landscapes.barriers import Landscape
 from polycorner.landscapes.convex import convex_landscape
 from polycorner.landscapes.curves import Curves
-from polycorner.landscapes.landscape import Landscape
 from polycorner.landscapes.passes import Sorted
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra import Polyhedron, Symmetry

@@ -42,10 +42,10 @@ from scipy.optimize import linprog
 from polycorner.intervals.balls import between, precision
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.intervals.tapes import Box
+from polycorner.landscapes.barriers import OUTSIDE, Bounds, Kind, Minimum, Pass, Side
 from polycorner.landscapes.components import components
 from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.descents import Descents, Target, unwound
-from polycorner.landscapes.landscape import OUTSIDE, Bounds, Kind, Minimum, Pass, Side
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import StationaryList
 from polycorner.proofs.lists.critical import CriticalList, CriticalPoint
@@ -255,14 +255,14 @@ class Sorted:
             if parts.open:
                 # Other components may be hidden in what is left, and some may be one.
                 self._undecided(lower, upper)
-            for k, sample in enumerate(parts.samples):
-                low, high = sample.copy(), sample.copy()
+            for part in parts.parts:
+                low, high = part.sample.copy(), part.sample.copy()
                 low[z], high[z] = place.sharp_lower, place.sharp_upper
                 spot = self.spot(low, high, frozenset())
                 orbit = -2 - number
                 if place.index == 0:
                     new = Minimum(spot.middle, self.energy(spot), (), "locus", orbit)
-                    target = self.descents.target(spot, parts.part(k))
+                    target = self.descents.target(spot, part)
                     self.nodes.append(Node(new, target))
                 else:
                     way = self._unstable(spot, z)

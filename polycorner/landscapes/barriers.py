@@ -202,7 +202,8 @@ class Landscape(Checked, Printed):
     def _nodes(self, leaving: bool) -> dict[int, int]:
         """Return the nodes of minima, also of those on walls of the region, by their numbers."""
         count = len(self.minima)
-        walls = {s.minimum for p in self.passes for s in p.sides if (s.minimum or 0) < 0}
+        sides = (side for p in self.passes for side in p.sides)
+        walls = {s.minimum for s in sides if s.minimum is not None and s.minimum < 0}
         if leaving:
             return dict.fromkeys([*walls, OUTSIDE], count) | {k: k for k in range(count)}
         # Two ways out need not meet outside, which is no way from minimum to minimum.
@@ -267,7 +268,7 @@ class Landscape(Checked, Printed):
         return Barrier(start, end, lower, upper, rise, used, self.proved, route)
 
     def _route(
-        self, way: Sequence[tuple[int, int, Link]], nodes: Mapping[int | None, int]
+        self, way: Sequence[tuple[int, int, Link]], nodes: Mapping[int, int]
     ) -> Route | None:
         """Return the ways down to both sides of the passes on a way, joined."""
         parts: list[tuple[Route, bool]] = []
@@ -275,7 +276,7 @@ class Landscape(Checked, Printed):
             routes = {
                 nodes[s.minimum]: s.route
                 for s in self.passes[link.source].sides
-                if s.minimum in nodes and s.route is not None
+                if s.minimum is not None and s.minimum in nodes and s.route is not None
             }
             parts += [(routes[c], back) for c, back in ((a, True), (b, False)) if c in routes]
         if not parts:
