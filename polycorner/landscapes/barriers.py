@@ -187,6 +187,9 @@ class Landscape(Checked, Printed):
         Whether a region was given that may be left.
     notes : tuple of str
         What is not decided, and what was assumed, in sentences.
+    euler : int or None
+        The Euler characteristic of the set, up to the cap, as the critical points of all kinds add
+        up to it: a check where it is known.  None where some are not decided, or are no points.
     """
 
     problem: Problem
@@ -196,6 +199,7 @@ class Landscape(Checked, Printed):
     cap: float = inf
     region: bool = False
     notes: tuple[str, ...] = ()
+    euler: int | None = None
 
     # ------------------------------------------------------------------------------------ barriers
 
@@ -414,6 +418,8 @@ class Landscape(Checked, Printed):
         if links:
             tables.append(Table(titles, links, (1, 2), "Passes"))
         counts = [("merges", str(len(self.merges))), ("loops", str(len(self.loops)))]
+        if self.euler is not None:
+            counts.append(("Euler characteristic", str(self.euler)))
         unit = units(self.problem.polyhedron.manifold.periods)
         return Sheet("Landscape", (self.statement, facts(counts), *tables, *self.notes, unit))
 

@@ -126,6 +126,7 @@ def landscape(
         float(cap),
         bool(exits),
         (*notes, *_sections(whole)),
+        ordered.euler,
     )
 
 

@@ -18,6 +18,12 @@ hold.  If there is but one, and it is ``A``, the above applies.  Otherwise join 
 coordinates and not empty, and two meet unless all ``u_i >= 0`` in both.  With ``Q`` the parts are
 joined along a direction in which ``Q < 0``.
 
+*Euler characteristic.*  Let ``N`` be the nerve of these parts: the sets of pieces whose union is
+not ``A``.  Passing the energy of the point adds ``(-1)^k (1 - chi(N))`` to the Euler characteristic
+of ``D_c``.  *Proof.*  The part of ``D`` near ``p`` below ``E(p)`` is homotopic to the nerve for
+``k = 0``, as intersections of its parts are convex, and to its join with a sphere of dimension
+``k - 1`` otherwise; what is added is the cone over it.
+
 *Loci.*  Where ``E`` depends on ``z`` alone and has a regular stationary point of index ``k`` there,
 each connected component of the points of ``D`` with this ``z`` counts as one point; the two sides
 for ``k = 1`` differ in the sign of the unstable coordinate of ``z``, all along it.
@@ -104,6 +110,7 @@ class Sorted:
         self.nodes: list[Node] = []
         self.outside: list[Target] = []  # minima at the walls of a region that may be left
         self.candidates: list[Candidate] = []
+        self.euler: int | None = 0
         for point in found.points:
             if (
                 bounds_of(room, self.spot(point.point.lower, point.point.upper, frozenset()))[0]
@@ -137,6 +144,7 @@ class Sorted:
             self._undecided(p.lower, p.upper, p.active, p.orbit)
         elif len(pieces) == 1 and p.index == 0 and pieces[0] >= held:
             self._minimum(spot, p.active, p.orbit)
+            self.euler = None if self.euler is None else self.euler + 1
         elif one.zeros != held or p.index is None:
             self._undecided(p.lower, p.upper, p.active, p.orbit)
         elif matter == held:
@@ -168,6 +176,8 @@ class Sorted:
     ) -> None:
         """Sort a point with independent gradients and positive multipliers."""
         p = one.point
+        if self.euler is not None and p.index is not None:
+            self.euler += (-1) ** p.index * (1 - nerve(held, pieces))
         about = spot, p.active, p.index
         if len(pieces) == 1:
             if p.index == 1:
@@ -196,6 +206,7 @@ class Sorted:
         self, lower: Array, upper: Array, active: tuple[str, ...] = (), orbit: int = -1
     ) -> None:
         spot = self.spot(lower, upper, frozenset())
+        self.euler = None
         new = Candidate(spot, active, None, "undecided", orbit, self.energy(spot))
         self.candidates.append(new)
 
@@ -241,6 +252,8 @@ class Sorted:
 
     def _loci(self) -> None:
         """Sort loci, each connected component by itself."""
+        if self.found.loci:
+            self.euler = None
         domain = self.found.domain
         for number, place in enumerate(self.found.loci):
             z = list(place.z)
@@ -433,6 +446,15 @@ def parted(active: frozenset[int], pieces: Sequence[Piece]) -> list[Piece]:
         if pieces[a] | pieces[b] != active:
             root[find(b)] = find(a)
     return [piece for k, piece in enumerate(pieces) if root[k] == k]
+
+
+def nerve(active: frozenset[int], pieces: Sequence[Piece]) -> int:
+    """Return the Euler characteristic of the nerve of lower points in pieces; see the module."""
+    chi = 0
+    for size in range(1, len(pieces) + 1):
+        some = (frozenset[int]().union(*chosen) for chosen in combinations(pieces, size))
+        chi -= (-1) ** size * sum(union != active for union in some)
+    return chi
 
 
 def bounds_of(curves: Curves, spot: Spot) -> Bounds:
