@@ -17,13 +17,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from polycorner import minimise, skeleton
-from polycorner.dumbbells import DumbbellPair, dyad_minima, pair_atlas, pair_map
+from polycorner.dumbbells import DumbbellPair, dyad_minima, meeting_basins, pair_atlas, pair_map
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import BunchRun, drum_for_bunch, follow_bunch
 from polycorner.dumbbells.dynamics.pairs import DumbbellLengths
 from polycorner.dumbbells.pictures import (
     draw_atlas,
     draw_heading,
+    draw_meetings,
     draw_pair,
     draw_pair_map,
     pair_film,
@@ -67,6 +68,13 @@ def proportions() -> None:
     """Draw the map over length and rod radius."""
     found = pair_map(np.linspace(2, 6, 12), np.linspace(0.05, 0.95, 8), tolerance=1e-3)
     save(draw_pair_map(found), _png("pair_map"))
+
+
+def collisions() -> None:
+    """Draw where collisions end, every half millimetre and every three degrees."""
+    grid = np.meshgrid(np.linspace(-22, 22, 89), np.radians(np.linspace(-90, 90, 61)))
+    found = meeting_basins(DRUM, np.stack([x.ravel() for x in grid], axis=1))
+    save(draw_meetings(DRUM, found), _png("meetings"))
 
 
 def tutorial() -> None:
@@ -179,7 +187,17 @@ def _png(name: str) -> Path:
 
 DRAWN = {
     f.__name__: f
-    for f in (heading, delta, atlas, proportions, tutorial, viewer, viewer_film, drum_bunch)
+    for f in (
+        heading,
+        delta,
+        atlas,
+        proportions,
+        collisions,
+        tutorial,
+        viewer,
+        viewer_film,
+        drum_bunch,
+    )
 }
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ The caller takes results in an order of its own, which does not depend on the wo
 does with them is the same for any number of workers.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import CancelledError, Future
 from typing import Any
 
@@ -85,6 +85,24 @@ class Lookahead:
         for key, (future, call) in self._calls.items():
             if not _is_finished(future) and (is_broken(error) or future.done()):
                 self._calls[key] = (self._submitted(call), call)
+
+
+def in_order(
+    workers: Workers | None, function: Callable[..., Any], common: Any, items: Sequence[Any]
+) -> Iterator[Any]:
+    """Yield ``function(common, item)`` for every item, in their order, or without workers here."""
+    if workers is None:
+        yield from (function(common, item) for item in items)
+        return
+    ahead, started = Lookahead(workers), 0
+    try:
+        for k in range(len(items)):
+            while started < len(items) and (started <= k or ahead.has_room):
+                ahead.start(started, function, common, items[started])
+                started += 1
+            yield ahead.result(k)
+    finally:
+        ahead.close()
 
 
 def _is_finished(future: "Future[Any]") -> bool:

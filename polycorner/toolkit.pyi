@@ -30,7 +30,7 @@ from .formulas.bundles import Call
 from .formulas.cache import cache_folder, source_key
 from .intervals.boxes import BoxFunctions
 from .kinds import check_fields, checked
-from .minimisation.feasibility import approach
+from .landscapes.steepest import steepest
 from .minimisation.problem import pose
 from .motion.bodies import FrictionContact, IdenticalBodies, MovingBody, PairContacts, PairLaw
 from .motion.formulation import TIME, Formulation, Laws
@@ -89,7 +89,6 @@ __all__ = [
     "Touch",
     "Value",
     "about",
-    "approach",
     "bridged",
     "cache_folder",
     "cached_property",
@@ -132,6 +131,7 @@ __all__ = [
     "signal_modes",
     "silent",
     "source_key",
+    "steepest",
     "wave_depth",
     "waves",
     "whole",

@@ -87,6 +87,14 @@ GROUPS = (
         },
     ),
     Group(
+        "Chart a landscape",
+        "Minima, the passes between them, barriers, and the shares of basins.",
+        {
+            "landscapes": "landscape Landscape Minimum Pass Side Merge Barrier Route basins Basins "
+            "minimum_of",
+        },
+    ),
+    Group(
         "Trace a skeleton",
         "Corners, edges and faces of a set, and how they are joined.",
         {
@@ -182,7 +190,8 @@ GROUPS = (
         "Two dumbbells in a drum: their minima, headings and skeleton.",
         {
             "dumbbells": "DumbbellPair dyad_minima DyadMinimum pair_minima pair_atlas PairAtlas "
-            "RelativePlacements minima_map MinimaMap pair_map PairMap",
+            "RelativePlacements minima_map MinimaMap pair_map PairMap meetings meeting_basins "
+            "placement_basins",
         },
     ),
     Group(
@@ -207,7 +216,8 @@ GROUPS = (
         "Pairs, skeletons, headings, maps of minima.",
         {
             "dumbbells.pictures": "draw_pair draw_heading draw_bifurcation draw_critical "
-            "draw_kinds draw_minima_map draw_pair_map draw_atlas draw_motions draw_wells",
+            "draw_kinds draw_minima_map draw_pair_map draw_atlas draw_motions draw_wells "
+            "draw_meetings",
         },
     ),
     Group(

@@ -17,6 +17,7 @@ ROOMS = (
     "polycorner.skeletons",
     "polycorner.minimisation",
     "polycorner.proofs",
+    "polycorner.landscapes",
     "polycorner.motion",
     "polycorner.bodies",
     "polycorner.models",

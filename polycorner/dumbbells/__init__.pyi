@@ -6,6 +6,7 @@ from .rigid import RigidDumbbells
 from .statics.critical import critical_length, critical_rod_radius, plane_critical_formula
 from .statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
 from .statics.keel import Keel, RestRegion
+from .statics.meetings import meeting_basins, meetings, placement_basins
 from .statics.minima import DyadMinimum, dyad_minima, heading_curve, paper_heading
 from .statics.minima_map import MinimaMap, minima_map, pair_minima
 from .statics.relative import RelativePlacements
@@ -34,12 +35,15 @@ __all__ = [
     "heading_curve",
     "heading_error_bar",
     "long_rod_length",
+    "meeting_basins",
+    "meetings",
     "minima_map",
     "pair_atlas",
     "pair_map",
     "pair_minima",
     "pair_sensitivity",
     "paper_heading",
+    "placement_basins",
     "plane_critical_formula",
     "plane_heading_formula",
 ]

@@ -1,4 +1,4 @@
-"""Estimates of the number of kinds in a population from abundances in a sample."""
+"""Estimates of shares, and of the number of kinds, in a population from a sample."""
 
 import math
 from collections.abc import Iterable
@@ -107,6 +107,20 @@ def richness(counts: Iterable[int]) -> Richness:
     else:
         variance, interval = _by_chance(met, n)
     return Richness(observed, n, f1, f2, observed + unseen, variance, interval)
+
+
+def share_interval(count: int, draws: int) -> tuple[float, float]:
+    """Return Wilson's interval of a share, at 95 %, from how many of some draws have it ([Wilson]).
+
+    The shares ``p`` with ``(count/n - p)^2 <= z^2 p (1 - p)/n``.  It is not empty at 0 and at 1.
+    """
+    if not draws:
+        return 0.0, 1.0
+    seen, small = count / draws, NORMAL**2 / draws
+    middle = (seen + small / 2) / (1 + small)
+    reach = math.sqrt(small * seen * (1 - seen) + small**2 / 4) / (1 + small)
+    # Rounding would miss both ends.
+    return middle - reach if count else 0.0, middle + reach if count < draws else 1.0
 
 
 def _by_chance(met: list[int], n: int) -> tuple[float, tuple[float, float]]:

@@ -13,6 +13,7 @@ of these connects stay apart, and points separated by less than the samples' dis
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -120,11 +121,8 @@ class Paths(Quotient):
         One that does not reduce it by a thousandth leads nowhere.
         Near a crossing of loci all curvatures are small: up to ``slack`` they are flat.
         """
-        analysis = analyse(self.problem, p, self.tolerances, higher="none")
-        curvature = analysis.curvature
-        level = max(analysis.small_curvature, slack)
-        flat = curvature.vectors[:, abs(curvature.values) <= level]
-        if not flat.shape[1] or curvature.least < -level:
+        flat, active = self._flat(p, slack)
+        if not flat.shape[1]:
             return None
         moves = 1e-5 * flat.T * self.scales
         # Differences: invariants of a user's symmetry have no derivatives that are known.
@@ -134,7 +132,26 @@ class Paths(Quotient):
             return None
         step = flat @ weights
         step = step * min(1.0, STRIDE / max(abs(step).max(), 1e-300))
-        return step, frozenset(analysis.active)
+        return step, active
+
+    def _flat(self, p: Array, slack: float) -> tuple[Array, Piece]:
+        """Return flat directions at a minimum as columns, none elsewhere, and what is active."""
+        analysis = analyse(self.problem, p, self.tolerances, higher="none")
+        curvature = analysis.curvature
+        level = max(analysis.small_curvature, slack)
+        flat = curvature.vectors[:, abs(curvature.values) <= level]
+        falls = curvature.least < -level
+        return flat[:, :0] if falls else flat, frozenset(analysis.active)
+
+    def beside(self, p: Array, energy: float, slack: float) -> Iterator[Array]:
+        """Yield points of a locus on all sides of one of it, about half a stride away."""
+        flat, active = self._flat(p, slack)
+        for step in STRIDE * np.vstack([flat.T, -flat.T]):
+            if self._is_clear(p, step):
+                guess = self.manifold.moved(p, step * self.scales)
+                point = self._settled(guess, active, STRIDE / 2, (energy, slack))
+                if point is not None:
+                    yield point
 
     def _stepped(
         self, p: Array, step: Array, active: Piece, goal: Array, energy: float, slack: float
@@ -194,8 +211,8 @@ class Locus:
         One, or a net of points of the locus, and all images of these.
     places : (k, d) array
         Their invariants; see :meth:`~polycorner.polyhedra.quotients.Quotient.place`.
-    count : int
-        How many starts ended here.
+    starts : list of int
+        The numbers of the starts that ended here.
     """
 
     certificate: Certificate
@@ -205,7 +222,7 @@ class Locus:
     points: list[Array]
     images: list[Array]
     places: Array
-    count: int = 1
+    starts: list[int] = field(default_factory=list)
 
     def nearest(self, place: Array) -> tuple[float, int]:
         """Return the distance of a place from the nearest image, and the index of that image."""
@@ -224,8 +241,8 @@ class Loci:
     quotient: Paths
     loci: list[Locus] = field(default_factory=list)
 
-    def add(self, found: Certificate) -> None:
-        """Record the end of a descent."""
+    def add(self, found: Certificate) -> Locus:
+        """Return the locus that the end of a descent belongs to, a new one if none is known."""
         energy, place = found.energy, self.quotient.place(found.point)
         level = [locus for locus in self.loci if abs(locus.energy - energy) <= locus.slack]
         # The nearest first: nearly always it is the one, and other comparisons are dear.
@@ -234,10 +251,11 @@ class Loci:
         if same is None:
             same = self._connected(near, found.point)
             if same is None:
-                self.loci.append(self._new(found, energy))
-                return
-            self._extend(same, found, place)
-        same.count += 1
+                same = self._new(found, energy)
+                self.loci.append(same)
+            else:
+                self._extend(same, found, place)
+        return same
 
     def merge(self) -> None:
         """Merge loci that turn out to be connected, once all descents are done."""
@@ -283,14 +301,27 @@ class Loci:
         if counts[1] < counts[0]:
             locus.certificate = found
         if locus.nearest(place)[0] > NET:
-            images = self.quotient.images(found.point)
-            locus.points.append(found.point)
-            locus.images += images
-            locus.places = np.vstack([locus.places, [self.quotient.place(q) for q in images]])
+            self._cast(locus, found.point)
+
+    def _cast(self, locus: Locus, point: Array) -> None:
+        """Add a point to the net of a locus."""
+        images = self.quotient.images(point)
+        locus.points.append(point)
+        locus.images += images
+        locus.places = np.vstack([locus.places, [self.quotient.place(q) for q in images]])
+
+    def spread(self, locus: Locus) -> None:
+        """Walk along a locus on all sides of its net until that covers it, or has many points."""
+        for p in locus.points:  # those that are found meanwhile among them
+            if len(locus.points) >= STEPS:
+                break
+            for q in self.quotient.beside(p, locus.energy, locus.slack):
+                if locus.nearest(self.quotient.place(q))[0] > NET / 2:
+                    self._cast(locus, q)
 
     def _merge(self, first: Locus, other: Locus) -> None:
         self.loci.remove(other)
-        first.count += other.count
+        first.starts += other.starts
         first.points += other.points
         first.images += other.images
         first.places = np.vstack([first.places, other.places])

@@ -1,8 +1,8 @@
 """Multi-start search for all local minima, each reported once up to a symmetry, and its outcome."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any, overload
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.checks import reals
+from polycorner.lookahead import in_order
 from polycorner.minimisation.abundance import Richness, richness
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.loci import Loci, Locus, Paths, check_symmetry
@@ -24,6 +25,7 @@ from polycorner.progress import Progress, silent
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
+from polycorner.workers import Shared, opened_if_any
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -31,9 +33,11 @@ if TYPE_CHECKING:
 
 # Bounds for each coordinate; None for a whole circle or sphere.
 Box = Sequence[tuple[float, float] | None]
+Begin = Callable[[Problem, Array], Array]
 TRIES = 10_000  # samples a start before they are moved into the polyhedron instead
 RESTORED = 20  # samples a start that are moved before a box is reported to miss the polyhedron
 CHECKED = 3  # starts at which a symmetry is checked
+TOGETHER = 20  # descents that a worker is given at a time
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -254,6 +258,7 @@ def minima(  # noqa: PLR0913 - all but two are options
     box: Box | None = None,
     rng: np.random.Generator | int | None = None,
     symmetry: Symmetry | None = None,
+    executor: Any = None,
     progress: Progress = silent,
     tolerance: float = TOLERANCE,
     rank_tolerance: float = RANK_TOLERANCE,
@@ -283,6 +288,9 @@ def minima(  # noqa: PLR0913 - all but two are options
         Source of sampled points; default a generator with seed 0.
     symmetry : Symmetry, optional
         Symmetry of the polyhedron *and of the energy* up to which minima are identified.
+    executor : optional
+        Where descents are computed, as for :func:`~polycorner.sweep`; the result does not depend on
+        it.  Default this process.
     progress : callable, optional
         Called after every start with the number of starts done, their total, and the number of
         minima in words; see :class:`~polycorner.progress.Progress`.
@@ -313,66 +321,111 @@ def minima(  # noqa: PLR0913 - all but two are options
     """
     tolerances = Tolerances.of(tolerance, rank_tolerance)
     problem = pose(polyhedron, energy)
+    points = start_points(problem, starts, box, rng)
+    loci = modulo(problem, symmetry, points, tolerances)
+    ends = descend_from(points, loci, executor, progress)
+    kept, others = by_level(filter(_is_minimum, loci.loci)), ends.others
+    return Minima(
+        certificates=tuple(locus.certificate for locus in kept),
+        counts=tuple(len(locus.starts) for locus in kept),
+        points=tuple(np.array(locus.points) for locus in kept),
+        elsewhere=ends.elsewhere,
+        others=tuple(locus.certificate for locus in others),
+        descents=ends.done,
+        starts=len(points),
+        interrupted=ends.interrupted,
+        modulo=symmetry is not None,
+    )
+
+
+def modulo(
+    problem: Problem, symmetry: Symmetry | None, points: Array, tolerances: Tolerances
+) -> Loci:
+    """Return no loci yet, up to a symmetry that is checked at some of the points."""
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
+    quotient = Paths(problem.polyhedron, symmetry or Symmetry(), tolerances, problem=problem)
+    check_symmetry(quotient, points[:CHECKED])
+    return Loci(quotient)
+
+
+@dataclass(eq=False)
+class Ends:
+    """Where the descents from some starts ended: in loci, or nowhere, each with its verdict."""
+
+    loci: Loci
+    lost: list[Verdict] = field(default_factory=list)
+    interrupted: bool = False
+
+    @property
+    def done(self) -> int:
+        """Number of descents."""
+        return len(self.lost) + sum(len(locus.starts) for locus in self.loci.loci)
+
+    @property
+    def others(self) -> list[Locus]:
+        """The loci that are no minima."""
+        return by_level(locus for locus in self.loci.loci if not _is_minimum(locus))
+
+    @property
+    def elsewhere(self) -> dict[Verdict, int]:
+        """How many ended in no minimum, by verdict."""
+        ended = Counter(self.lost)
+        for locus in self.others:
+            ended[locus.certificate.verdict] += len(locus.starts)
+        return dict(ended.most_common())
+
+
+def descend_from(
+    points: Array, loci: Loci, executor: Any, progress: Progress, begin: Begin | None = None
+) -> Ends:
+    """Descend from every point and add to the loci where that ends, until done or Ctrl-C.
+
+    ``begin`` may go part of the way.
+    """
     if not callable(progress):
         checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
-    points = start_points(problem, starts, box, rng)
-    quotient = Paths(polyhedron, symmetry or Symmetry(), tolerances, problem=problem)
-    check_symmetry(quotient, points[:CHECKED])
-    loci, failures = Loci(quotient), Counter[Verdict]()
-    interrupted = False
+    ends, number, problem = Ends(loci), 0, loci.quotient.problem
+    size = 1 if executor is None else TOGETHER
+    parts = [points[k : k + size] for k in range(0, len(points), size)]
+    shared = Shared((problem, loci.quotient.tolerances, begin))
     try:
-        for done, q in enumerate(points, 1):
-            found = minimise(
-                polyhedron,
-                problem.energy,
-                q,
-                tolerance=tolerance,
-                rank_tolerance=rank_tolerance,
-            )
-            if found.search is not None and found.verdict is found.search:
-                failures[found.search] += 1
-            else:
-                loci.add(found)
-            count = sum(map(_is_minimum, loci.loci))
-            progress(done, len(points), f"{count} minima")
+        with opened_if_any(executor) as workers:
+            for part in in_order(workers, _descended, shared, parts):
+                for found in part:
+                    if found.search is not None and found.verdict is found.search:
+                        ends.lost.append(found.search)
+                    else:
+                        # What is compiled for the problem of this process serves all of them.
+                        own = found if workers is None else replace(found, problem=problem)
+                        loci.add(own).starts.append(number)
+                    number += 1
+                    count = sum(map(_is_minimum, loci.loci))
+                    progress(number, len(points), f"{count} minima")
         loci.merge()
     except KeyboardInterrupt:
-        interrupted = True
-    outcome = _outcome(loci.loci, failures, len(points), interrupted=interrupted)
-    return replace(outcome, modulo=symmetry is not None)
+        ends.interrupted = True
+    return ends
+
+
+def _descended(shared: Shared, points: Array) -> list[Certificate]:
+    """Return the ends of descents; called in a worker."""
+    problem, tolerances, begin = shared.value
+    where = problem.polyhedron, problem.energy
+    limits = {"tolerance": tolerances.zero, "rank_tolerance": tolerances.rank}
+    return [minimise(*where, begin(problem, q) if begin else q, **limits) for q in points]
 
 
 def _is_minimum(locus: Locus) -> bool:
     return locus.certificate.is_minimum
 
 
-def _outcome(
-    loci: list[Locus], failures: Counter[Verdict], starts: int, *, interrupted: bool
-) -> Minima:
-    ordered = _by_level(loci)
-    kept = [locus for locus in ordered if _is_minimum(locus)]
-    others = [locus for locus in ordered if not _is_minimum(locus)]
-    for locus in others:
-        failures[locus.certificate.verdict] += locus.count
-    return Minima(
-        certificates=tuple(locus.certificate for locus in kept),
-        counts=tuple(locus.count for locus in kept),
-        points=tuple(np.array(locus.points) for locus in kept),
-        elsewhere=dict(failures.most_common()),
-        others=tuple(locus.certificate for locus in others),
-        descents=sum(locus.count for locus in kept) + failures.total(),
-        starts=starts,
-        interrupted=interrupted,
-    )
-
-
-def _by_level(loci: list[Locus]) -> list[Locus]:
+def by_level(several: Iterable[Locus]) -> list[Locus]:
     """Return loci by energy, those of equal energy in the order in which they were found.
 
     Rounding errors of equal energies, as of mirror images, thus do not decide the order.
     """
+    loci = list(several)
     levels: dict[int, int] = {}
     level, last = 0, -np.inf
     for k in sorted(range(len(loci)), key=lambda k: loci[k].energy):

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.lookahead import Lookahead
+from polycorner.lookahead import in_order
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.quotients import Quotient
 from polycorner.progress import Progress
@@ -250,20 +250,7 @@ def _walked(
 ) -> Iterator[tuple[Sequence[Start], list[tuple[int, int, Array]]]]:
     """Yield the starts of walks, some at a time, and what was found."""
     shared = Shared(explorer.quotient)
-    if workers is None:
-        yield from ((chunk, touched(shared, chunk)) for chunk in chunks)
-        return
-    ahead = Lookahead(workers)
-    try:
-        for i, chunk in enumerate(chunks):
-            for k in range(i, len(chunks)):
-                if k not in ahead:
-                    if k > i and not ahead.has_room:
-                        break
-                    ahead.start(k, touched, shared, chunks[k])
-            yield chunk, ahead.result(i)
-    finally:
-        ahead.close()
+    yield from zip(chunks, in_order(workers, touched, shared, chunks), strict=True)
 
 
 def _starts(explorer: Explorer, examined: set[Flag]) -> Iterator[Start]:

@@ -13,7 +13,7 @@ from oracles_search import flooded, minima_on_interval, orbit_count
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Symmetry, Verdict
 from polycorner.minimisation import minima
 from polycorner.minimisation.loci import Locus
-from polycorner.minimisation.multistart import _by_level
+from polycorner.minimisation.multistart import by_level
 from polycorner.models import Pinball
 from polycorner.polyhedra import Element
 
@@ -339,4 +339,4 @@ def test_rounding_does_not_order_minima_of_equal_energy(order, noise):
         Locus(None, k // 2 + 1e-12 * noise[k], 1e-9, False, [], [], np.zeros((0, 1))) for k in order
     ]
     expected = sorted(range(6), key=lambda position: order[position] // 2)
-    assert _by_level(loci) == [loci[position] for position in expected]
+    assert by_level(loci) == [loci[position] for position in expected]

@@ -3,7 +3,7 @@
 import api_samples as of
 import numpy as np
 
-from polycorner import pictures
+from polycorner import dumbbells, pictures
 from polycorner.dumbbells.dynamics.bunch import BunchRun
 
 
@@ -58,6 +58,8 @@ DUMBBELLS = {
     "dumbbells.heading_curve": lambda: {"pair": of.pair(), "lengths": [16.0, 20.0]},
     "dumbbells.heading_error_bar": lambda: {"pair": of.pair(), "tolerances": {"length": 0.1}},
     "dumbbells.long_rod_length": lambda: {"ball_radius": 3.0, "rod_radius": 1.5},
+    "dumbbells.meeting_basins": lambda: {"pair": of.pair(), "starts": 2},
+    "dumbbells.meetings": lambda: {"pair": of.pair(), "offsets": [0.0], "headings": [0.1]},
     "dumbbells.minima_map": lambda: {
         "curvatures": [0.5],
         "rods": [0.5],
@@ -102,6 +104,7 @@ DUMBBELLS = {
     "dumbbells.pictures.draw_bifurcation": lambda: {"pair": of.pair()},
     "dumbbells.pictures.draw_climbing": lambda: {"zigzags": [], "drum": of.steady().drum},
     "dumbbells.pictures.draw_critical": lambda: {"ball_radius": 3.0},
+    "dumbbells.placement_basins": lambda: {"pair": of.pair(), "starts": 2},
     "dumbbells.pictures.draw_drum": lambda: {"run": of.run()},
     "dumbbells.pictures.draw_exits": lambda: {"runs": {"a": BunchRun(of.run())}},
     "dumbbells.pictures.draw_heading": lambda: {
@@ -112,6 +115,10 @@ DUMBBELLS = {
     "dumbbells.pictures.draw_history": lambda: {"run": of.run()},
     "dumbbells.pictures.draw_keel": lambda: {"keel": of.keel()},
     "dumbbells.pictures.draw_kinds": lambda: {"found": of.minima_map()},
+    "dumbbells.pictures.draw_meetings": lambda: {
+        "pair": of.pair(),
+        "found": dumbbells.meeting_basins(of.pair(), 2),
+    },
     "dumbbells.pictures.draw_minima_map": lambda: {"found": of.minima_map()},
     "dumbbells.pictures.draw_motions": lambda: {"atlas": of.atlas()},
     "dumbbells.pictures.draw_pair": lambda: {"entry": of.dyad()},

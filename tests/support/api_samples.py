@@ -9,7 +9,7 @@ import numpy as np
 import sympy
 
 import polycorner as pc
-from polycorner import bodies, dumbbells, models, motion, polyhedra, proofs, sweeps
+from polycorner import bodies, dumbbells, landscapes, models, motion, polyhedra, proofs, sweeps
 from polycorner.dumbbells import pictures as drum_pictures
 from polycorner.dumbbells.dynamics.singles import Mean
 from polycorner.dumbbells.dynamics.steady import Steady
@@ -57,6 +57,9 @@ proof = cache(lambda: pc.prove(certificate(), digits=8))
 corner_list = cache(lambda: proofs.corners(square(), box=UNIT))
 stationary_list = cache(lambda: proofs.stationary_points(square(), energy(), box=UNIT))
 cell = cache(lambda: pc.prove(certificate(), digits=8, parameters={"a": (1.9, 2.1)}))
+ridge = cache(lambda: pc.Polyhedron(M, {"sides": 4 - X**2, "bottom": Y, "top": 1 - Y}))
+RIDGE = {"energy": (X**2 - 1) ** 2 + X / 4 + Y + Y**2, "box": {"x": (-3.0, 3.0), "y": (-1.0, 2.0)}}
+landscape = cache(lambda: landscapes.landscape(ridge(), **RIDGE, region={"gate": 3 - X**2}))
 nerve = cache(lambda: polyhedra.nerve(square(), Y))
 locus = cache(lambda: proofs.StationaryLocus({"x": 0.0}, {"x": 1.0}, 0, np.array([0.5, 0.0])))
 

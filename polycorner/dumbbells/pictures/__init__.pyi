@@ -5,6 +5,7 @@ from .dyads import draw_heading, draw_pair
 from .experiments import draw_climbing, draw_exits, draw_steady_headings
 from .film import Film, pair_film, run_film
 from .keel import draw_keel
+from .meetings import draw_meetings
 from .minima_map import draw_kinds, draw_minima_map
 from .motion_strips import draw_motions
 from .movies import write_movie
@@ -30,6 +31,7 @@ __all__ = [
     "draw_history",
     "draw_keel",
     "draw_kinds",
+    "draw_meetings",
     "draw_minima_map",
     "draw_motions",
     "draw_pair",
