@@ -45,15 +45,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import between, precision
+from polycorner.intervals.balls import ball, between, precision
 from polycorner.intervals.boxes import BoxFunctions
+from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.landscapes.barriers import OUTSIDE, Bounds, Kind, Minimum, Pass, Side
 from polycorner.landscapes.components import components
 from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.descents import Descents, Target, unwound
 from polycorner.polyhedra.polyhedron import Piece
-from polycorner.proofs import StationaryList
+from polycorner.proofs import StationaryList, StationaryPoint
+from polycorner.proofs.kkt import KKTSystem, enclose, newton
 from polycorner.proofs.lists.critical import CriticalList, CriticalPoint
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -129,13 +131,44 @@ class Sorted:
             box = tuple(between(a, b) for a, b in zip(lower.tolist(), upper.tolist(), strict=True))
         return Spot(box, zeros)
 
+    def sharp(self, p: StationaryPoint, zeros: frozenset[int], names: Sequence[str]) -> Spot:
+        """Return the point of a list, enclosed to more digits where that is possible."""
+        wide = self.spot(p.lower, p.upper, zeros)
+        n = self.problem.dimension
+        d, fixed = self.problem.polyhedron, self.found.domain.fixed
+        held = (*sorted(d.names.index(name) for name in names), *self.curves.equations)
+        slopes = self.problem.evaluate(wide.middle, 1)[1]
+        sizes = np.linalg.norm(slopes, axis=1)
+        if not np.isfinite(sizes).all() or not (sizes[list(held)] > 0).all():
+            return wide
+        lam = np.linalg.lstsq(
+            np.vstack([slopes[list(held)], np.eye(n)[list(fixed)]]).T, slopes[-1], rcond=None
+        )[0]
+        units = [*self.problem.scales, *(max(sizes[-1], 1.0) / sizes[list(held)])]
+        units += [1.0] * len(fixed)
+        gauges = tuple(tuple(row) for row in np.eye(n)[list(fixed)].tolist())
+        about = self.curves.formulas, held, gauges, tuple(wide.middle.tolist())
+        system = KKTSystem(*about, tuple(map(float, units)))
+        start = [ball(x) for x in (*wide.middle.tolist(), *lam.tolist())]
+        found = newton(system, start, bits=BITS)
+        if isinstance(found, Undecided):
+            return wide
+        with precision(BITS):
+            image = enclose(system, found, bits=BITS)
+            if isinstance(image, Undecided):
+                return wide
+            box = image.solution[:n]
+            # A solution in the box is its only one: the one that the list has.
+            inside = all(x.contains(y) for x, y in zip(wide.box, box, strict=True))
+            return replace(wide, box=tuple(box)) if inside else wide
+
     def energy(self, spot: Spot) -> Bounds:
         """Return bounds of the energy on a box."""
         return bounds_of(self.curves, spot)
 
     def _sort(self, one: CriticalPoint) -> None:
         p, d = one.point, self.problem.polyhedron
-        spot = self.spot(p.lower, p.upper, one.zeros)
+        spot = self.sharp(p, one.zeros, p.active)
         signs = self._signs(spot)
         held = frozenset(d.names.index(name) for name in p.active)
         pieces = d.signs_to_pieces(signs or [])
@@ -301,7 +334,7 @@ class Sorted:
         for p in found.points:
             lam = p.multipliers.get(wall)
             zeros = frozenset(d.names.index(name) for name in (*p.active, *p.redundant)) | {g}
-            spot = self.spot(p.lower, p.upper, zeros)
+            spot = self.sharp(p, zeros, (*p.active, wall))
             plain = p.index == 0 and not p.redundant and lam is not None
             signs = self._signs(spot)
             pieces = [] if signs is None else d.signs_to_pieces(signs)
