@@ -93,7 +93,7 @@ bench: .venv/.bench ## side-by-side runs against other tools
 	    echo "$$file"; .venv/bin/python "$$file"; done
 
 trials: .venv/.dev ## correctness on problems that strangers bring, about an hour
-	@set -e; for trial in hock_schittkowski random_formulas adversarial known_lists; do \
+	@set -e; for trial in hock_schittkowski random_formulas adversarial known_lists landscapes; do \
 	    .venv/bin/python -m benchmarks.trials.run_$$trial; done
 
 # ---------------------------------------------------------------------------------------- upkeep
