@@ -37,6 +37,7 @@ from examples import (
     ex26_drum_in_space,
     ex27_hard_squares,
     ex28_heap_in_drum,
+    ex30_clusters_of_atoms,
 )
 from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
@@ -126,6 +127,13 @@ def test_rigid_clusters(tmp_path):
     found = ex20_rigid_clusters.main()
     assert [graph.size() for graph, _ in found.clusters] == [12, 12]
     picture = ex20_rigid_clusters.draw(found, tmp_path / "clusters.png")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_clusters_of_atoms(tmp_path):
+    found = ex30_clusters_of_atoms.main()
+    assert found.depth(1)[1] == pytest.approx(0.2239, abs=1e-4)
+    picture = ex30_clusters_of_atoms.draw(found, tmp_path / "atoms.png")
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

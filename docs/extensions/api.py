@@ -148,7 +148,7 @@ GROUPS = (
         "Use a model",
         "Sets and energies that are ready-made.",
         {
-            "models": "Tutorial Pinball SphereCluster TorusDisks CriticalConfiguration "
+            "models": "Tutorial Pinball SphereCluster LennardJones TorusDisks CriticalConfiguration "
             "CriticalSearch PeriodicPacking JammedPacking CirclesIn SpheresInCube PointsOnSphere "
             "basin_hopping BasinHopping read_coordinates CoordinateTable",
         },

@@ -2,6 +2,7 @@ from .barriers import Barrier, Landscape, Merge, Minimum, Pass, Side
 from .basins import Basins, basins, minimum_of
 from .enumeration import landscape
 from .routes import Route
+from .saddles import found_landscape
 
 __all__ = [
     "Barrier",
@@ -13,6 +14,7 @@ __all__ = [
     "Route",
     "Side",
     "basins",
+    "found_landscape",
     "landscape",
     "minimum_of",
 ]

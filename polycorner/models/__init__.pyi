@@ -1,3 +1,4 @@
+from .clusters import LennardJones
 from .disks.configurations import CriticalConfiguration
 from .disks.critical import CriticalSearch
 from .disks.disks import TorusDisks
@@ -18,6 +19,7 @@ __all__ = [
     "CriticalConfiguration",
     "CriticalSearch",
     "JammedPacking",
+    "LennardJones",
     "PeriodicPacking",
     "Pinball",
     "PointsOnSphere",

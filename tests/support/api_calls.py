@@ -77,6 +77,7 @@ VALUES = {
     "Isosurface": of.isosurface,
     "JammedPacking": of.packing,
     "Keel": lambda: dumbbells.Keel(0.12, 0.1, 0.3, 0.06, 0.2),
+    "LennardJones": lambda: models.LennardJones(2),
     "Membership": lambda: polycorner.exact_point(of.square(), ORIGIN),
     "Manifold": lambda: of.M,
     "Mass": lambda: bodies.mass_of(of.hexagon()),
@@ -176,6 +177,13 @@ CALLS = {
     # minimisation
     "certify": lambda: {"polyhedron": of.square(), "energy": of.energy(), "q": ORIGIN},
     "minima": lambda: {
+        "polyhedron": of.square(),
+        "energy": of.energy(),
+        "starts": 2,
+        "box": of.UNIT,
+        "rng": 0,
+    },
+    "landscapes.found_landscape": lambda: {
         "polyhedron": of.square(),
         "energy": of.energy(),
         "starts": 2,
@@ -352,6 +360,7 @@ CALLS = {
     "PeriodicPacking.density": lambda: {"inflation": 1.0},
     "PeriodicPacking.jam": lambda: {"start": 0, "max_programmes": 2},
     "PeriodicPacking.soft_start": lambda: {"iterations": 5},
+    "LennardJones.starts": lambda: {"rng": 0, "count": 2},
     "Pinball.starts": lambda: {"rng": 0, "count": 2},
     "SphereCluster.contacts": lambda: {"q": of.tetrahedron()},
     "SphereCluster.distances": lambda: {"q": of.tetrahedron()},

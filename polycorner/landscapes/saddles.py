@@ -1,0 +1,717 @@
+"""Passes that a search finds, and landscapes of them, without proof.
+
+Walks uphill (:mod:`~polycorner.landscapes.walks`) start near minima, between two of them and at
+random, on the faces of contacts that are left closed, and end at stationary points of index 1, a
+few of index 2.  Whether components join at such a point is decided in doubles: by signs of
+multipliers and curvatures; with multipliers that are zero by the copositivity of a Schur
+complement; in a union by the pieces that meet, at minima on the intersections of two branches.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb, inf
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from polycorner import checks
+from polycorner.landscapes.barriers import Kind, Landscape, Minimum, Pass, Side
+from polycorner.landscapes.routes import Route
+from polycorner.landscapes.walks import Mask, Numbers, Orbits, Walks
+from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.copositivity import simplex_minimisers
+from polycorner.minimisation.findings import OPEN, Local
+from polycorner.minimisation.loci import Loci, Locus, Paths, check_symmetry
+from polycorner.minimisation.methods import FARTHEST, minimise
+from polycorner.minimisation.multistart import CHECKED, Box, start_points
+from polycorner.minimisation.problem import MOST_NUMBERS, Problem, pose
+from polycorner.polyhedra.cones import Rows, inward_direction, linear_programme, rank
+from polycorner.polyhedra.polyhedron import Piece, Polyhedron
+from polycorner.polyhedra.strata import distances, local_pieces
+from polycorner.polyhedra.symmetry import Symmetry, vector_field
+from polycorner.progress import Progress, silent
+from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, SEARCH, TOLERANCE, Tolerances
+
+if TYPE_CHECKING:
+    from polycorner.minimisation.problem import Energy
+
+PART = 100  # walks that are done together, at most
+SECOND = 8  # every so many walks ends at a point of index 2, where weak contacts may make a pass
+MOST_VERTICES = 5000  # of multipliers that are not unique, which are tried
+NEAREST = 4  # points from which a pair of branches is tried, at least
+
+
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A way down from a pass.
+
+    Attributes
+    ----------
+    direction : (n,) array
+        In scaled coordinates.
+    closed : frozenset of int
+        The contacts that are kept closed.
+    bend : (n,) array or None
+        Where contacts cannot all be kept: what is added, times the square of the distance, to stay
+        in the set and be lowest there.
+    """
+
+    direction: Array
+    closed: Piece
+    bend: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """Where components of a sublevel set join at a point.
+
+    Attributes
+    ----------
+    ways : tuple of Way
+        One for each component below the point nearby; fewer than two at no pass.
+    index : int
+        Negative curvatures along the face of the contacts with positive multipliers.
+    kind : {"saddle", "tip", "locus"}
+    """
+
+    ways: tuple[Way, ...]
+    index: int
+    kind: Kind
+
+
+def orbits_of(problem: Problem, symmetry: Symmetry | None) -> Orbits:
+    """Return the function from points ``(B, n)`` to scaled tangent vectors of their orbits."""
+    manifold, n = problem.polyhedron.manifold, problem.dimension
+    if symmetry is None or (symmetry.tangents is None and not symmetry.fields):
+        return lambda q: np.zeros((len(q), 0, n))
+    if symmetry.tangents is not None:
+        tangents = symmetry.tangents
+        return lambda q: np.array([tangents(x) for x in q]).reshape(len(q), -1, n) / problem.scales
+    fields = [vector_field(manifold, field) for field in symmetry.fields]
+
+    def orbits(q: Array) -> Array:
+        rows = [np.stack([f.value(q) for f in field], axis=1) for field in fields]
+        return np.stack(rows, axis=1) / problem.scales
+
+    return orbits
+
+
+# ------------------------------------------------------------------------------------- crossings
+
+
+def crossing_at(
+    problem: Problem, q: Array, tolerances: Tolerances, free: int = 0
+) -> Crossing | None:
+    """Return how components join at a stationary point; None where they do not, or it is not seen.
+
+    Not seen are points with dependent gradients of contacts and, in unions, with multipliers that
+    are zero.  Of the flat directions as many as ``free`` are explained by a symmetry.
+    """
+    local = Local.at(problem, q, tolerances)
+    pieces = local_pieces(problem.polyhedron, local.away, tolerances.zero)
+    if not pieces or not np.isfinite(local.hessians).all():
+        return None
+    active = sorted(frozenset[int]().union(*pieces))
+    gradients = local.gradients[[*active, *local.sections]]
+    rows = Rows(gradients, tolerances.rank)
+    shares = _multipliers(rows, len(active), local)
+    if not len(shares) or (len(pieces) > 1 and (len(shares) > 1 or shares.min() <= local.small)):
+        return None
+    sizes = np.linalg.norm(gradients, axis=1)
+    bends = local.hessians[[*active, *local.sections]]
+    forms = local.hessians[-1] - np.einsum("ci,ijk->cjk", shares / sizes, bends)
+    small = tolerances.curvature * max(local.reference, float(abs(forms).max()))
+    if len(shares) > 1:
+        bent = bends / sizes[:, None, None]
+        return _redundant(rows, len(active), shares, forms, bent, local.slope, (local.small, small))
+    curvatures, ways = np.linalg.eigh(rows.null_space.T @ forms[0] @ rows.null_space)
+    ways = rows.null_space @ ways
+    index = int((curvatures < -small).sum())
+    if len(pieces) > 1:
+        duals = np.asarray(np.linalg.pinv(rows.units), dtype=np.float64)
+        found = _tip(pieces, active, shares[0], duals) if index == 0 else ()
+        return Crossing(found, index, "tip")
+    closed = frozenset(active)
+    both = tuple(Way(side * ways[:, 0], closed) for side in (1.0, -1.0)) if index == 1 else ()
+    kind: Kind = "locus" if (abs(curvatures) <= small).sum() > free else "saddle"
+    weak = np.flatnonzero(shares[0, : len(active)] <= local.small)
+    if not len(weak):
+        return Crossing(both, index, kind)
+    firm, opened = abs(curvatures) > small, np.linalg.pinv(rows.units)[:, weak]
+    stiff = ways[:, firm]
+    relaxed = opened - stiff @ ((stiff.T @ forms[0] @ opened) / curvatures[firm][:, None])
+    form = opened.T @ forms[0] @ relaxed
+    more = index + int((np.linalg.eigvalsh(form) < -small).sum())
+    if index:
+        copositive = simplex_minimisers(form)[1].min() >= -small
+        return Crossing(both if copositive else (), more, kind)
+    found = tuple(
+        Way(relaxed @ u, closed - {active[weak[i]] for i in np.flatnonzero(u)})
+        for u in _components(form, small)
+    )
+    return Crossing(found, more, kind)
+
+
+def _multipliers(rows: Rows, k: int, local: Local) -> Array:
+    """Return the multipliers of unit rows ``(c, k + e)`` of which all others are mixtures.
+
+    None where there are none whose first ``k`` are not negative, or they are too many to list.
+    """
+    units, slope = rows.units, local.slope
+    shares = rows.weights(slope)
+    left = abs(slope - shares @ units).max(initial=0.0)
+    if left > OPEN * local.small:
+        return np.empty((0, len(units)))
+    relations = rows.relations.T
+    loose = len(relations)
+    if not loose:
+        return shares[None] if (shares[:k] >= -local.small).all() else shares[:0]
+    inward = inward_direction(units[:k], units[k:])[1] > local.tolerances.rank
+    if not inward or comb(k, loose) > MOST_VERTICES:  # otherwise they are not bounded
+        return np.empty((0, len(units)))
+    found = []
+    for zero in combinations(range(k), loose):
+        matrix = relations[:, zero]
+        if abs(np.linalg.det(matrix)) > local.tolerances.rank:
+            vertex = shares - np.linalg.solve(matrix.T, shares[list(zero)]) @ relations
+            if (vertex[:k] >= -local.small).all():
+                found.append(vertex)
+    return np.array(found).reshape(len(found), len(units))
+
+
+def _redundant(
+    rows: Rows,
+    k: int,
+    shares: Array,
+    forms: Array,
+    bends: Array,
+    slope: Array,
+    zero: tuple[float, float],
+) -> Crossing | None:
+    """Return how components join where multipliers are not unique, mixtures of given ones.
+
+    Below the point are the directions in which each of the forms is negative.  Where a mixture of
+    the forms has index 1 they fall apart into opposite halves.  Not seen are points where a
+    function has no positive multiplier, and those where other mixtures have to be tried.
+    """
+    if (shares[:, :k].mean(axis=0) <= zero[0]).any():
+        return None
+    inner = rows.null_space.T @ forms @ rows.null_space
+    for form in [inner.mean(axis=0), *inner]:
+        curvatures, ways = np.linalg.eigh(form)
+        index = int((curvatures < -zero[1]).sum())
+        if index == 0:
+            return Crossing((), 0, "saddle")
+        rates = np.einsum("i,cij,j->c", ways[:, 0], inner, ways[:, 0])
+        if index == 1 and (rates < -zero[1]).all():
+            way = rows.null_space @ ways[:, 0]
+            bend = _bend(rows, k, slope, np.einsum("kij,i,j->k", bends, way, way))
+            both = tuple(Way(side * way, frozenset(), bend) for side in (1.0, -1.0))
+            return Crossing(both, 1, "saddle")
+    return None
+
+
+def _bend(rows: Rows, k: int, slope: Array, bent: Array) -> Array:
+    """Return ``w`` of the least ``slope w`` with ``rows w + bent / 2 >= 0``, ``= 0`` after ``k``.
+
+    All multipliers are positive, so that on the span of the rows the least value is attained.
+    """
+    span = np.linalg.svd(rows.units)[2][: rows.rank]
+    held = rows.units @ span.T
+    first = -np.linalg.pinv(held[k:]) @ (bent[k:] / 2)
+    limits = held[:k] @ first + bent[:k] / 2
+    most = FARTHEST * (1.0 + float(abs(bent).max()))
+    more = linear_programme(span @ slope, -held[:k], limits, bound=most, equations=held[k:])
+    return np.asarray((first + more) @ span)
+
+
+def _components(form: Array, small: float) -> list[Array]:
+    """Return a point of each component of ``{u >= 0, u^T C u < 0}``.
+
+    A segment between two such points is in the set unless the form is positive on it: exact for
+    two coordinates; with more, two points of one component may be taken for two.
+    """
+    points, values = simplex_minimisers(form)
+    low = [u for u, value in zip(points, values, strict=True) if value < -small]
+    found: list[Array] = []
+    for u in low:
+        if not any(_joined(form, u, v) for v in found):
+            found.append(u)
+    return found
+
+
+def _joined(form: Array, u: Array, v: Array) -> bool:
+    a, b, c = u @ form @ u, v @ form @ v, u @ form @ v
+    return bool(c < np.sqrt(a * b))
+
+
+def _tip(
+    pieces: Sequence[Piece], active: Sequence[int], shares: Array, duals: Array
+) -> tuple[Way, ...]:
+    """Return the ways down from a minimum on all contacts at once, one for each class of pieces.
+
+    Two pieces are joined unless together they have all contacts.
+    """
+    classes: list[list[Piece]] = []
+    for piece in pieces:
+        near = [c for c in classes if any(len(piece | other) < len(active) for other in c)]
+        classes = [c for c in classes if c not in near] + [sum(near, [piece])]
+    ways = []
+    for piece, *_ in classes:
+        kept = np.array([i in piece for i in active])
+        # Contacts of the piece open a little, and the others are crossed so far that this pays.
+        fall = 1.0 + 2 * shares[: len(active)][kept].sum() / shares[: len(active)][~kept].sum()
+        way = duals[:, : len(active)] @ np.where(kept, 1.0, -fall)
+        ways.append(Way(way / np.linalg.norm(way), frozenset()))
+    return tuple(ways)
+
+
+def sides_of(problem: Problem, certificate: Certificate) -> tuple[Array, ...]:
+    """Return points a little below a pass, one on each side of it, in the polyhedron.
+
+    Parameters
+    ----------
+    problem : Problem
+    certificate : Certificate
+        Of the pass.
+
+    Returns
+    -------
+    tuple of (n,) arrays
+        Two or more; none where the point is no pass, or not seen to be one.
+    """
+    found = crossing_at(problem, certificate.point, certificate.tolerances)
+    walks = Walks(problem, orbits_of(problem, None), certificate.tolerances)
+    starts = _starts(walks, certificate.point, found) if found is not None else []
+    return tuple(q for q, _, _ in starts)
+
+
+Start = tuple[Array, Mask, Mask]  # a point, the functions of its branch, contacts that are closed
+
+
+def _starts(walks: Walks, q: Array, crossing: Crossing) -> list[Start]:
+    """Return points below a pass with their branches; none unless they are at least two."""
+    found = [_start(walks, q, way) for way in crossing.ways]
+    starts = [start for start in found if start is not None]
+    return starts if len(starts) >= max(2, len(found)) else []
+
+
+def _start(walks: Walks, q: Array, way: Way) -> Start | None:
+    """Return the nearest point on a way that is lower by more than rounding."""
+    problem = walks.problem
+    energy = float(problem.energy.value(q))
+    closed = problem.mask(way.closed)
+    closed = closed.copy()
+    for length in sorted(SEARCH.pushes):
+        bend = 0.0 if way.bend is None else length**2 * way.bend
+        ahead = q + (length * way.direction + bend) * problem.scales
+        allowed = _branch(problem, ahead, walks.tolerances.zero)
+        reached, placed = walks.placed(ahead[None], allowed[None], closed[None])
+        noise = walks.tolerances.level * length**2 * max(1.0, abs(energy))
+        if reached[0] and problem.energy.value(placed[0]) < energy - noise:
+            return placed[0], allowed, closed & allowed
+    return None
+
+
+def _branch(problem: Problem, q: Array, zero: float) -> Mask:
+    d = problem.polyhedron
+    if not d.is_union:
+        return problem.mask(frozenset(range(problem.inequalities)))
+    return problem.mask(d.selections(d.values(q).tolist(), zero)[0])
+
+
+# ---------------------------------------------------------------------------------------- search
+
+
+def search_passes(  # noqa: PLR0913 - all but two are options
+    problem: Problem,
+    minima: Sequence[Certificate],
+    *,
+    starts: int,
+    rng: np.random.Generator,
+    tolerances: Tolerances = DEFAULT,
+    symmetry: Symmetry | None = None,
+    cap: float = inf,
+    points: Sequence[Array] = (),
+    progress: Progress = silent,
+) -> tuple[Certificate, ...]:
+    """Search for passes by walks uphill from given minima.
+
+    Parameters
+    ----------
+    problem : Problem
+    minima : sequence of Certificate
+        From which, and between which, walks start.
+    starts : int
+        How many walks are done.
+    rng : Generator
+        Source of directions.
+    tolerances : Tolerances, optional
+    symmetry : Symmetry, optional
+        Up to which passes are listed once.
+    cap : float, optional
+        The highest energy.
+    points : sequence of (n,) arrays, optional
+        Points from which other walks start.
+    progress : callable, optional
+        Called with walks done, their number, and the number of stationary points in words.
+
+    Returns
+    -------
+    tuple of Certificate
+        The lowest first: saddles of index 1 with positive multipliers; in a union, minima on two
+        branches at once; with multipliers that are zero, what the second order makes a pass.
+        After an interruption (Ctrl-C), those that were found so far.
+    """
+    quotient = Paths(problem.polyhedron, symmetry or Symmetry(), tolerances, problem=problem)
+    walks, loci = Walks(problem, orbits_of(problem, symmetry), tolerances), Loci(quotient)
+    both = tolerances.zero, tolerances.rank
+
+    def record(q: Array) -> None:
+        if problem.energy.value(q) <= cap and _is_inside(problem, q, tolerances.zero):
+            loci.add(Certificate(problem, q, *both, method="face"))
+
+    try:
+        done = 0
+        for part in _parts(problem, [c.point for c in minima], points, starts, rng):
+            closed = part.closed & part.allowed
+            ends, _, found = walks.climb(part.q, part.allowed, closed, part.way, part.rising)
+            for q in ends[found]:
+                record(q)
+            done += len(ends)
+            progress(done, starts + len(points), f"{len(loci.loci)} stationary points")
+        for q in _tips(walks, [*(c.point for c in minima), *points], starts, rng):
+            record(q)
+    except KeyboardInterrupt:
+        pass
+    seen = sorted(loci.loci, key=lambda locus: locus.energy)
+    return tuple(c for c in (locus.certificate for locus in seen) if sides_of(problem, c))
+
+
+def _is_inside(problem: Problem, q: Array, zero: float) -> bool:
+    values, gradients = problem.evaluate(q, 1)
+    return bool(local_pieces(problem.polyhedron, distances(values[:-1], gradients[:-1]), zero))
+
+
+def _together(problem: Problem) -> int:
+    """Return how many walks are done together, with all second derivatives in memory."""
+    return max(1, min(PART, MOST_NUMBERS // (problem.rows * problem.dimension**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Walks that are done together; see :meth:`.Walks.climb`."""
+
+    q: Array
+    allowed: Mask
+    closed: Mask
+    way: Array
+    rising: Numbers
+
+
+def _parts(
+    problem: Problem,
+    lows: Sequence[Array],
+    points: Sequence[Array],
+    starts: int,
+    rng: np.random.Generator,
+) -> Iterator[Part]:
+    """Yield walks from given points, and others near minima and between two of them in turn."""
+    scales, manifold = problem.scales, problem.polyhedron.manifold
+    count = starts + len(points) if len(lows) else len(points)
+    size = _together(problem)
+    for first in range(0, count, size):
+        q, allowed, closed = [], [], []
+        for k in range(first, min(first + size, count)):
+            held = np.zeros(problem.inequalities, dtype=np.bool_)
+            if k < len(points):
+                q.append(points[k])
+                allowed.append(_some_branch(problem, points[k], rng))
+            else:
+                a, b = (lows[i] for i in rng.integers(len(lows), size=2))
+                part = rng.uniform() if k % 2 else 0.0
+                aside = rng.normal(size=len(scales)) * rng.uniform() / np.sqrt(len(scales))
+                between = manifold.difference(b, a)
+                q.append(manifold.moved(a, part * between + aside * scales))
+                allowed.append(_some_branch(problem, q[-1] if k % 2 else a, rng))
+                values, gradients = problem.evaluate(a, 1)
+                near = abs(distances(values[:-1], gradients[:-1])) <= DEFAULT.near
+                held = near[: problem.inequalities] & (rng.uniform(size=len(held)) < rng.uniform())
+            closed.append(held)
+        places = np.array(q)
+        yield Part(
+            places,
+            np.array(allowed),
+            np.array(closed).reshape(len(places), problem.inequalities),
+            rng.normal(size=places.shape),
+            np.where(np.arange(first, first + len(places)) % SECOND, 1, min(2, len(scales))),
+        )
+
+
+def _some_branch(problem: Problem, q: Array, rng: np.random.Generator) -> Mask:
+    """Return the functions of a branch that holds at a point, or nearly does, at random."""
+    d = problem.polyhedron
+    if not d.is_union:
+        return problem.mask(frozenset(range(problem.inequalities)))
+    found = d.selections(d.values(q).tolist(), DEFAULT.near)
+    return problem.mask(found[rng.integers(len(found))])
+
+
+def _tips(
+    walks: Walks, points: Sequence[Array], starts: int, rng: np.random.Generator
+) -> Iterator[Array]:
+    """Yield minima on intersections of two parts of a union, from points near both edges.
+
+    Walks begin where a function of each part vanishes.
+    """
+    problem = walks.problem
+    always, unions = problem.polyhedron.unions
+    pairs = [(a, b) for u in unions for a, b in combinations(u, 2) if a - b and b - a]
+    if not pairs or not len(points):
+        return
+    values = problem.polyhedron.values(np.array(points))
+    count = max(NEAREST, starts // len(pairs))
+    for a, b in pairs:
+        away = [abs(values[:, sorted(piece)].min(axis=1)) for piece in (a, b)]
+        q = np.array([points[k] for k in np.maximum(*away).argsort()[:count]])
+        closed = np.zeros((len(q), problem.inequalities), dtype=np.bool_)
+        for row in closed:
+            row[[rng.choice(sorted(a - b)), rng.choice(sorted(b - a))]] = True
+        allowed = np.array([_some_branch(problem, place, rng) for place in q])
+        allowed |= problem.mask(always | a | b)
+        reached, q = walks.placed(q, allowed, closed)
+        paths, _, found = walks.fall(q[reached], allowed[reached], closed[reached])
+        yield from (path[-1] for path, settled in zip(paths, found, strict=True) if settled)
+
+
+# ------------------------------------------------------------------------------------- landscape
+
+
+@dataclass(frozen=True, eq=False)
+class Node:
+    """A minimum of the landscape: an image of a locus under the finite group."""
+
+    locus: Locus
+    orbit: int
+    point: Array
+    place: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Lows:
+    """The minima that walks downhill have reached."""
+
+    walks: Walks
+    loci: Loci
+
+    @property
+    def minima(self) -> list[Locus]:
+        """The minima among the points reached, the lowest first."""
+        found = [locus for locus in self.loci.loci if locus.certificate.is_minimum]
+        return sorted(found, key=lambda locus: locus.energy)
+
+    def ends(self, q: Array, allowed: Mask, closed: Mask) -> list[tuple[Locus | None, Array]]:
+        """Return the minima that walks down end in, and their points."""
+        size, found = _together(self.walks.problem), list[tuple[Locus | None, Array]]()
+        for first in range(0, len(q), size):
+            part = slice(first, first + size)
+            paths, _, settled = self.walks.fall(q[part], allowed[part], closed[part])
+            found += [self._end(path, bool(s)) for path, s in zip(paths, settled, strict=True)]
+        return found
+
+    def _end(self, path: Array, settled: bool) -> tuple[Locus | None, Array]:
+        problem, tolerances = self.walks.problem, self.walks.tolerances
+        both = tolerances.zero, tolerances.rank
+        if settled and _is_inside(problem, path[-1], tolerances.zero):
+            locus = self.loci.add(Certificate(problem, path[-1], *both, method="face"))
+            if locus.certificate.is_minimum:
+                return locus, path
+        found = minimise(
+            problem.polyhedron, problem.energy, path[-1], tolerance=both[0], rank_tolerance=both[1]
+        )
+        path = np.vstack([path, found.point])
+        return self.loci.add(found) if found.is_minimum else None, path
+
+    def landscape(self, passes: Sequence[Certificate], cap: float) -> Landscape:
+        """Return the landscape of given passes and the minima below them."""
+        ways = [self._crossed(c) for c in passes]
+        nodes = [node for k, locus in enumerate(self.minima) for node in self._images(k, locus)]
+        nodes = [node for node in nodes if node.locus.energy <= cap]
+        listed = [p for k, way in enumerate(ways) for p in self._passes(k, *way, nodes)]
+        return Landscape(
+            self.walks.problem,
+            tuple(map(_minimum, nodes)),
+            tuple(listed),
+            proved=False,
+            cap=cap,
+        )
+
+    def _crossed(
+        self, found: Certificate
+    ) -> tuple[Certificate, Crossing, list[tuple[Locus | None, Array]]]:
+        """Return a pass with the ways down from it, which begin there."""
+        quotient, problem = self.loci.quotient, self.walks.problem
+        free = rank(quotient.orbit(found.point), quotient.tolerances.rank)
+        crossing = crossing_at(problem, found.point, quotient.tolerances, free)
+        if crossing is None:
+            msg = "passes: expected points that are seen to be passes"
+            raise ValueError(msg)
+        starts = _starts(self.walks, found.point, crossing)
+        q, allowed, closed = (np.array(part) for part in zip(*starts, strict=True))
+        ends = self.ends(q, allowed, closed)
+        return found, crossing, [(end, np.vstack([found.point, path])) for end, path in ends]
+
+    def _images(self, orbit: int, locus: Locus) -> Iterator[Node]:
+        """Yield the images of a minimum; a locus that is more than an orbit is listed once."""
+        count = 1 if locus.wide else len(self.loci.quotient.symmetry.group)
+        for _, point, place in self._distinct(locus.points[0], count):
+            yield Node(locus, orbit, point, place)
+
+    def _distinct(self, q: Array, count: int) -> Iterator[tuple[int, Array, Array]]:
+        """Yield the first images of a point that differ, with the numbers of the elements."""
+        quotient, seen = self.loci.quotient, list[Array]()
+        for k, image in enumerate(quotient.images(q)[:count]):
+            place = quotient.place(image)
+            if all(abs(place - other).max() > quotient.tolerances.same for other in seen):
+                seen.append(place)
+                yield k, image, place
+
+    def _passes(
+        self,
+        orbit: int,
+        found: Certificate,
+        crossing: Crossing,
+        ends: list[tuple[Locus | None, Array]],
+        nodes: Sequence[Node],
+    ) -> Iterator[Pass]:
+        """Yield the images of a pass."""
+        group = self.loci.quotient.symmetry.group
+        for k, point, _ in self._distinct(found.point, len(group)):
+            carried = [(e, np.array([group[k].apply(q) for q in path])) for e, path in ends]
+            yield Pass(
+                point=point,
+                energy=(found.energy, found.energy),
+                active=tuple(self._names(found.stratum.active, group[k].names)),
+                index=crossing.index,
+                kind=crossing.kind,
+                sides=tuple(self._side(end, path, nodes) for end, path in carried),
+                orbit=orbit,
+            )
+
+    @staticmethod
+    def _names(active: Iterable[str], renaming: Mapping[str, str]) -> list[str]:
+        return [renaming.get(name, name) for name in active]
+
+    def _side(self, end: Locus | None, path: Array, nodes: Sequence[Node]) -> Side:
+        """Return a side with its minimum, and its route if that leads to the minimum listed."""
+        quotient, place = self.loci.quotient, self.loci.quotient.place(path[-1])
+        apart = [
+            (float(np.linalg.norm(node.place - place)), k)
+            for k, node in enumerate(nodes)
+            if node.locus is end
+        ]
+        if not apart:
+            return Side(None)
+        k = min(apart)[1]
+        away = abs(quotient.manifold.chord(path[-1], nodes[k].point) / quotient.scales).max()
+        if away > quotient.tolerances.near:
+            return Side(k)
+        energies = self.walks.problem.energy.value(path)
+        return Side(k, Route(path, energies, float(energies.max()), verified=False))
+
+
+def _minimum(node: Node) -> Minimum:
+    found = node.locus.certificate
+    kind: Literal["isolated", "locus"] = "locus" if node.locus.wide else "isolated"
+    return Minimum(node.point, (found.energy, found.energy), found.active, kind, node.orbit)
+
+
+def found_landscape(  # noqa: PLR0913 - all but two are options
+    polyhedron: Polyhedron,
+    energy: "Energy",
+    *,
+    box: Box | None = None,
+    starts: Any = 200,
+    rng: np.random.Generator | int | None = None,
+    symmetry: Symmetry | None = None,
+    cap: float = inf,
+    progress: Progress = silent,
+    tolerance: float = TOLERANCE,
+    rank_tolerance: float = RANK_TOLERANCE,
+) -> Landscape:
+    """Return the landscape of the minima and passes that searches find, which proves nothing.
+
+    Minima are those that descents from the starts reach, and those that lie below a pass.
+
+    Parameters
+    ----------
+    polyhedron : Polyhedron
+        The set ``D``.
+    energy : SmoothFunction or sympy.Expr
+        The energy ``E``, on the same manifold.
+    box, starts, rng
+        Points from which descents and walks uphill start, as of
+        :func:`~polycorner.minimisation.multistart.minima`.  As many walks again start near minima.
+    symmetry : Symmetry, optional
+        Of the polyhedron and the energy.  Points are listed once up to motions and to groups that
+        are too large to list; images under ``elements`` are listed, as one orbit.
+    cap : float, optional
+        The highest energy.
+    progress : callable, optional
+        See :class:`~polycorner.progress.Progress`.
+    tolerance, rank_tolerance : float, optional
+        See :class:`~polycorner.minimisation.certificate.Certificate`.
+
+    Returns
+    -------
+    Landscape
+        Not proved.  A side without a minimum is one from which a descent did not end in any; a
+        side without a route leads to an image of its minimum under the symmetry.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As of :func:`~polycorner.minimisation.multistart.minima`.
+
+    Examples
+    --------
+    >>> from polycorner import Manifold, Polyhedron
+    >>> M = Manifold.euclidean("x y")
+    >>> x, y = M.symbols
+    >>> D = Polyhedron(M, {"disc": 4 - x**2 - y**2})
+    >>> found = found_landscape(D, (x**2 - 1) ** 2 + x / 4 + y**2, starts=50, box=[(-2, 2)] * 2)
+    >>> len(found.minima), [p.point.round(3).tolist() for p in found.passes]
+    (2, [[0.063, 0.0]])
+    """
+    tolerances = Tolerances.of(tolerance, rank_tolerance)
+    problem = pose(polyhedron, energy)
+    if symmetry is not None:
+        checks.instance("symmetry", symmetry, Symmetry)
+    checks.real("cap", cap, infinite=True)
+    if not callable(progress):
+        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
+    problem.check_size()
+    if problem.is_sparse:
+        checks.refuse("polyhedron", "one of few coordinates", problem.dimension)
+    generator = checks.generator("rng", rng)
+    points = start_points(problem, starts, box, generator)
+    quotient = Paths(polyhedron, symmetry or Symmetry(), tolerances, problem=problem)
+    check_symmetry(quotient, points[:CHECKED])
+    walks = Walks(problem, orbits_of(problem, symmetry), tolerances)
+    lows = Lows(walks, Loci(quotient))
+    allowed = np.array([_some_branch(problem, q, generator) for q in points])
+    lows.ends(points, allowed, np.zeros_like(allowed))
+    passes = search_passes(
+        problem,
+        [locus.certificate for locus in lows.minima],
+        starts=len(points),
+        rng=generator,
+        tolerances=tolerances,
+        symmetry=symmetry,
+        cap=cap,
+        points=list(points),
+        progress=progress,
+    )
+    return lows.landscape(passes, cap)
