@@ -37,6 +37,7 @@ from examples import (
     ex26_drum_in_space,
     ex27_hard_squares,
     ex28_heap_in_drum,
+    ex29_cages,
     ex30_clusters_of_atoms,
 )
 from polycorner import Verdict, stratum_at
@@ -363,3 +364,16 @@ def test_a_heap_that_is_swept_obeys_the_balances_of_energy_and_angular_momentum(
     assert found.path.max_penetration < 0.02  # of a disc's radius
     assert ex28_heap_in_drum.draw(found, tmp_path / "heap.png").exists()
     assert ex28_heap_in_drum.film(found.path, tmp_path / "heap.gif").read_bytes()[:3] == b"GIF"
+
+
+def test_cages():
+    cages = ex29_cages.main()
+    for name, cage in cages.items():
+        assert cage.height - ex29_cages.NEAR <= cage.paving.lower <= cage.height, name
+        assert cage.rest[1] < cage.height
+    # A way out of the spikes, on which the square touches both of them until it lies on its side.
+    way = ex29_cages.tipping()
+    spikes = cages["spikes"]
+    assert np.allclose(way[0], spikes.rest, atol=1e-6)
+    assert spikes.arrangement.polyhedron.contains(way, tolerance=1e-9).all()
+    assert spikes.height - 1e-6 <= way[:, 1].max() <= spikes.height + 1e-12

@@ -1,6 +1,7 @@
 from .barriers import Barrier, Landscape, Merge, Minimum, Pass, Side
 from .basins import Basins, basins, minimum_of
 from .enumeration import landscape
+from .paving import Paving, paved_barrier
 from .routes import Route
 from .saddles import found_landscape
 
@@ -11,10 +12,12 @@ __all__ = [
     "Merge",
     "Minimum",
     "Pass",
+    "Paving",
     "Route",
     "Side",
     "basins",
     "found_landscape",
     "landscape",
     "minimum_of",
+    "paved_barrier",
 ]
