@@ -17,7 +17,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from polycorner import minimise, skeleton
-from polycorner.dumbbells import DumbbellPair, dyad_minima, meeting_basins, pair_atlas, pair_map
+from polycorner.dumbbells import (
+    DumbbellPair,
+    RelativePlacements,
+    dyad_minima,
+    meeting_basins,
+    pair_atlas,
+    pair_map,
+)
+from polycorner.dumbbells.cli.landscape import names as minimum_names
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import BunchRun, drum_for_bunch, follow_bunch
 from polycorner.dumbbells.dynamics.pairs import DumbbellLengths
@@ -27,6 +35,7 @@ from polycorner.dumbbells.pictures import (
     draw_meetings,
     draw_pair,
     draw_pair_map,
+    draw_relative,
     pair_film,
     write_solid,
 )
@@ -36,8 +45,9 @@ from polycorner.dumbbells.studies.bunches import one_above_the_other
 from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.dumbbells.viewer import descent, film_page, live_application, serve, write_page
 from polycorner.dumbbells.viewer.server import bound
+from polycorner.landscapes import landscape
 from polycorner.models import Tutorial
-from polycorner.pictures import draw_region, save
+from polycorner.pictures import draw_landscape, draw_region, save
 from polycorner.skeletons.search import traced
 
 IMAGES = Path(__file__).parent / "images"
@@ -75,6 +85,30 @@ def collisions() -> None:
     grid = np.meshgrid(np.linspace(-22, 22, 89), np.radians(np.linspace(-90, 90, 61)))
     found = meeting_basins(DRUM, np.stack([x.ravel() for x in grid], axis=1))
     save(draw_meetings(DRUM, found), _png("meetings"))
+
+
+def dyad_landscape() -> None:
+    """Draw how dyads open: one of the four parts of the tree that differ in the names of balls."""
+    model = RelativePlacements(DRUM)
+    cap = model.energy_at(0.16)
+    found = landscape(
+        model.polyhedron, model.energy, box=model.box, symmetry=model.symmetry, cap=cap
+    )
+    minima = [k for k in range(len(found.minima)) if not k or found.barrier(k, 0).upper < cap]
+    some = [
+        replace(p, sides=tuple(replace(s, minimum=minima.index(s.minimum)) for s in p.sides))
+        for p in found.passes
+        if {s.minimum for s in p.sides} <= set(minima)
+    ]
+    part = replace(found, minima=tuple(found.minima[k] for k in minima), passes=tuple(some))
+    symbols = {"delta_R": "δ R", "delta_L": "δ L"}
+    names = [symbols.get(name, name) for name in minimum_names(model, part)]
+    contacts = [" ".join(p.active) for p in some]
+    drawn = draw_landscape(
+        part, pictures=draw_relative(model), names=names, pass_names=contacts,
+        height=model.height, label="height (mm)",
+    )  # fmt: skip
+    save(drawn, _png("dyad_landscape"))
 
 
 def tutorial() -> None:
@@ -193,6 +227,7 @@ DRAWN = {
         atlas,
         proportions,
         collisions,
+        dyad_landscape,
         tutorial,
         viewer,
         viewer_film,

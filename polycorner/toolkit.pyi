@@ -37,6 +37,7 @@ from .motion.formulation import TIME, Formulation, Laws
 from .motion.random_functions import check_band, field_modes, signal_modes
 from .motion.simulation import LONGEST, SHORTEST_STEP
 from .motion.trajectory import Touch
+from .pictures.films import RATE, Picture, check_movie, movie_suffix, write_frames
 from .pictures.solids.charts import Chart, Gaps
 from .pictures.solids.grids import FEWEST_CELLS, Function
 from .pictures.style import BODIES, SHADES, bridged
@@ -59,6 +60,7 @@ __all__ = [
     "DEFAULT",
     "FEWEST_CELLS",
     "LONGEST",
+    "RATE",
     "SHADES",
     "SHORTEST_STEP",
     "SOURCES",
@@ -82,6 +84,7 @@ __all__ = [
     "Orbits",
     "PairContacts",
     "PairLaw",
+    "Picture",
     "Progress",
     "Quotient",
     "Sheet",
@@ -94,6 +97,7 @@ __all__ = [
     "cached_property",
     "check_band",
     "check_fields",
+    "check_movie",
     "checked",
     "checks",
     "choice",
@@ -111,6 +115,7 @@ __all__ = [
     "motion_attributes",
     "motion_coordinates",
     "motion_data",
+    "movie_suffix",
     "nearest",
     "norm",
     "orbits",
@@ -136,4 +141,5 @@ __all__ = [
     "waves",
     "whole",
     "write_atomically",
+    "write_frames",
 ]

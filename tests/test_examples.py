@@ -39,6 +39,7 @@ from examples import (
     ex28_heap_in_drum,
     ex29_cages,
     ex30_clusters_of_atoms,
+    ex31_landscape,
 )
 from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
@@ -377,3 +378,18 @@ def test_cages():
     assert np.allclose(way[0], spikes.rest, atol=1e-6)
     assert spikes.arrangement.polyhedron.contains(way, tolerance=1e-9).all()
     assert spikes.height - 1e-6 <= way[:, 1].max() <= spikes.height + 1e-12
+
+
+def test_a_ball_leaves_its_pocket_over_the_tip_of_a_wedge(tmp_path):
+    found = ex31_landscape.main()
+    assert found.complete
+    assert found.minima[1].active == ("wedge1.ab", "wedge2.ab")
+    tip = 2.4 + 3.2 / ex31_landscape.LEAN  # the corner (3.2, 2.4) of the second wedge
+    way = found.barrier(1, 0)
+    assert way.lower <= tip + 1e-12
+    assert way.lower == pytest.approx(tip, rel=1e-12)
+    assert way.upper == pytest.approx(tip, rel=1e-9)
+    assert way.route.verified
+    assert [path.stat().st_size > 10_000 for path in ex31_landscape.draw(found, tmp_path)]
+    film = ex31_landscape.film(found, tmp_path / "way.gif", frames=3)
+    assert film.read_bytes()[:3] == b"GIF"

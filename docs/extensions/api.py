@@ -88,10 +88,10 @@ GROUPS = (
     ),
     Group(
         "Chart a landscape",
-        "Minima, the passes between them, barriers, and the shares of basins.",
+        "How deep minima are, over which passes they are left, shares of basins.",
         {
-            "landscapes": "landscape Landscape Minimum Pass Side Merge Barrier Route basins Basins "
-            "minimum_of",
+            "landscapes": "landscape found_landscape Landscape Minimum Pass Side Merge Barrier "
+            "Route paved_barrier Paving basins Basins minimum_of",
         },
     ),
     Group(
@@ -148,18 +148,19 @@ GROUPS = (
         "Use a model",
         "Sets and energies that are ready-made.",
         {
-            "models": "Tutorial Pinball SphereCluster LennardJones TorusDisks CriticalConfiguration "
-            "CriticalSearch PeriodicPacking JammedPacking CirclesIn SpheresInCube PointsOnSphere "
+            "models": "Tutorial Pinball SphereCluster LennardJones TorusDisks "
+            "CriticalConfiguration CriticalSearch PeriodicPacking JammedPacking CirclesIn "
+            "SpheresInCube PointsOnSphere "
             "basin_hopping BasinHopping read_coordinates CoordinateTable",
         },
     ),
     Group(
         "Save and load",
-        "Problems, certificates, skeletons, graphs and trajectories in files.",
+        "Problems, certificates, skeletons, landscapes, graphs and trajectories in files.",
         {
             "files": "ProblemFile save_problem load_problem save_certificate load_certificate "
             "save_skeleton load_skeleton save_trajectory load_trajectory skeleton_graph "
-            "save_graph load_graph",
+            "save_graph load_graph save_landscape load_landscape",
         },
     ),
     Group(
@@ -174,7 +175,8 @@ GROUPS = (
         "Figures of sets, bodies and results.",
         {
             "pictures": "draw_region draw_arrangement draw_clusters draw_motion draw_packing "
-            "draw_critical draw_cells draw_barcode save",
+            "draw_critical draw_cells draw_barcode draw_landscape draw_landscape_map film_route "
+            "save",
         },
     ),
     Group(
@@ -216,8 +218,8 @@ GROUPS = (
         "Pairs, skeletons, headings, maps of minima.",
         {
             "dumbbells.pictures": "draw_pair draw_heading draw_bifurcation draw_critical "
-            "draw_kinds draw_minima_map draw_pair_map draw_atlas draw_motions draw_wells "
-            "draw_meetings",
+            "draw_kinds draw_minima_map draw_pair_map draw_relative draw_atlas draw_motions "
+            "draw_wells draw_meetings",
         },
     ),
     Group(

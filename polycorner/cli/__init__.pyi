@@ -1,3 +1,4 @@
+from .landscape import Telling, landscape_options, report_landscape, searched
 from .minima import report_minima, start_options
 from .options import (
     Command,
@@ -37,6 +38,7 @@ __all__ = [
     "Command",
     "GroupedCommand",
     "SkeletonSearch",
+    "Telling",
     "columns",
     "command",
     "config_option",
@@ -47,12 +49,15 @@ __all__ = [
     "from_file",
     "given",
     "json_text",
+    "landscape_options",
     "option",
     "output_options",
     "prepare",
     "remark",
+    "report_landscape",
     "report_minima",
     "search_options",
+    "searched",
     "seed_option",
     "shown",
     "start_options",

@@ -8,6 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from polycorner.cli.atlas import STARTS, planar, skeletal
+from polycorner.cli.landscape import WORDS as PASSES
+from polycorner.cli.landscape import (
+    Telling,
+    landscape_options,
+    report_landscape,
+    searched,
+)
 from polycorner.cli.minima import WORDS, report_minima, start_options
 from polycorner.cli.options import (
     command,
@@ -36,6 +43,7 @@ if TYPE_CHECKING:
     from polycorner.proofs import Proof
 
 DRAWN = 20  # times as many random points, of which those in the set are taken first
+FLAGS = {"max_boxes": "--max-boxes", "max_seconds": "--seconds"}
 FILE = "examples/problems/circles_in_square.toml"
 
 
@@ -314,6 +322,60 @@ def _flat(problem: "ProblemFile") -> bool:
     """Whether the set is a region of a plane."""
     d = problem.polyhedron
     return d.manifold.size == 2 and not d.equations and not d.manifold.circles
+
+
+# --------------------------------------------------------------------------------------- landscape
+
+
+@command(epilog=examples("landscape region.toml --cap 2", f"landscape {FILE} --starts 100"))
+@with_problem
+@option(
+    "--starts",
+    type=click.IntRange(min=1),
+    group="Search",
+    help="Search from so many starts, which proves nothing. [complete lists]",
+)
+@seed_option("the starts")
+@landscape_options
+def landscape(
+    file: Path, starts: int | None, seed: int, limits: dict[str, Any], as_json: bool,
+    out: Path | None,
+) -> None:  # fmt: skip
+    """Tell over which passes the minima of the problem in FILE are left, and how high these are.
+
+    With proof, if the file gives each coordinate on a line a box and there are no spheres and
+    rotations; or as found by searches from --starts.
+    """
+    problem = read(file)
+    if problem.energy is None:
+        fail(f"{file}: energy: expected minimise or maximise; got none")
+    if starts is None:
+        limits["box"] = _boxes(problem, file)
+    elif unused := limits.keys() - {"cap"}:
+        flags = ", ".join(sorted(FLAGS[name] for name in unused))
+        fail(f"--starts: expected no {flags} beside it, which are of complete lists; got both")
+    prepare(out)
+    with working(PASSES, "boxes" if starts is None else "starts") as progress:
+        if starts is not None:
+            import numpy as np
+
+            rng = np.random.default_rng(seed)
+            limits |= {"starts": _starts(problem, rng, starts), "rng": rng}
+        found = searched(problem.polyhedron, problem.energy, progress=progress, **limits)
+    telling = Telling(unit=problem.energy.unit)
+    report_landscape(file.stem, {"file": str(file)}, found, telling, as_json=as_json, out=out)
+
+
+def _boxes(problem: "ProblemFile", file: Path) -> dict[str, Any]:
+    """Return the boxes of all coordinates on lines, or end the command where one is missing."""
+    manifold = problem.polyhedron.manifold
+    circles = {manifold.names[i] for i in manifold.circles}
+    box = {n: b for n, b in zip(manifold.names, problem.box, strict=True) if n not in circles}
+    missing = [name for name, sides in box.items() if sides is None]
+    if missing:
+        fail(f"{file}: coordinates: expected a box of {', '.join(missing)}, in which passes are"
+             " listed, or --starts; got none")  # fmt: skip
+    return box
 
 
 # -------------------------------------------------------------------------------------------- view

@@ -1,5 +1,6 @@
 from .certificates import load_certificate, save_certificate
 from .graphs import load_graph, save_graph, skeleton_graph
+from .landscapes import load_landscape, save_landscape
 from .problems import ProblemFile, load_problem, save_problem
 from .skeletons import load_skeleton, save_skeleton
 from .trajectories import load_trajectory, save_trajectory
@@ -8,11 +9,13 @@ __all__ = [
     "ProblemFile",
     "load_certificate",
     "load_graph",
+    "load_landscape",
     "load_problem",
     "load_skeleton",
     "load_trajectory",
     "save_certificate",
     "save_graph",
+    "save_landscape",
     "save_problem",
     "save_skeleton",
     "save_trajectory",

@@ -2,9 +2,12 @@ from .arrangements import draw_arrangement
 from .barcodes import draw_barcode
 from .clusters import draw_clusters, draw_motion
 from .disks import draw_critical
+from .landscape_maps import draw_landscape_map
+from .landscapes import draw_landscape
 from .packings import draw_packing
 from .parameter_boxes import draw_cells
 from .regions import draw_region
+from .route_films import film_route
 from .solids import (
     Isosurface,
     SharpSurface,
@@ -29,10 +32,13 @@ __all__ = [
     "draw_cells",
     "draw_clusters",
     "draw_critical",
+    "draw_landscape",
+    "draw_landscape_map",
     "draw_motion",
     "draw_packing",
     "draw_region",
     "draw_solid",
+    "film_route",
     "isosurface",
     "place_solid",
     "save",

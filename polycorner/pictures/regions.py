@@ -71,8 +71,8 @@ def draw_region(
         For a polyhedron that is not planar, or bounds, points, polylines or a resolution of
         another form.
     """
-    _check_planar(polyhedron)
-    left, right, bottom, top = _bounds(bounds)
+    check_planar(polyhedron)
+    left, right, bottom, top = drawn_bounds(bounds)
     resolution = whole("resolution", resolution, least=2, most=MOST)
     instance("title", title, str)
     marked, held = _points("corners", corners), _points("minima", minima)
@@ -81,7 +81,7 @@ def draw_region(
     size = (LENGTH * (right - left) / unit, LENGTH * (top - bottom) / unit)
     figure = Figure(figsize=(size[0] + 0.6, size[1] + 0.8), layout="constrained")
     axes = figure.add_subplot()
-    _shade(axes, polyhedron, (left, right, bottom, top), resolution, outline=not lines)
+    shade(axes, polyhedron, (left, right, bottom, top), resolution, outline=not lines)
     for label, line in lines:
         axes.plot(line[:, 0], line[:, 1], color=SIDE, linewidth=2, solid_capstyle="round")
         middle = _middle(line)
@@ -98,7 +98,7 @@ def draw_region(
     return figure
 
 
-def _shade(
+def shade(
     axes: Axes,
     polyhedron: Polyhedron,
     bounds: tuple[float, float, float, float],
@@ -106,6 +106,7 @@ def _shade(
     *,
     outline: bool,
 ) -> None:
+    """Shade a planar polyhedron, with its boundary if asked."""
     left, right, bottom, top = bounds
     step = max(right - left, top - bottom) / resolution
     columns, rows = math.ceil((right - left) / step) + 1, math.ceil((top - bottom) / step) + 1
@@ -183,7 +184,8 @@ def _middle(line: Array) -> Array:
     return np.array([np.interp(half, travelled, line[:, k]) for k in (0, 1)])
 
 
-def _check_planar(polyhedron: Polyhedron) -> None:
+def check_planar(polyhedron: Polyhedron) -> None:
+    """Raise ValueError for a polyhedron that is not a region of the plane."""
     instance("polyhedron", polyhedron, Polyhedron)
     if polyhedron.dimension != 2 or polyhedron.equations:
         msg = (
@@ -193,7 +195,8 @@ def _check_planar(polyhedron: Polyhedron) -> None:
         raise ValueError(msg)
 
 
-def _bounds(bounds: Any) -> tuple[float, float, float, float]:
+def drawn_bounds(bounds: Any) -> tuple[float, float, float, float]:
+    """Return the sides of the part of the plane that is drawn."""
     array = finite(reals("bounds", bounds), "bounds")
     if array.shape != (4,) or not (array[0] < array[1] and array[2] < array[3]):
         refuse("bounds", "left < right and bottom < top", bounds)

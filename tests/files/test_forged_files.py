@@ -20,12 +20,13 @@ from forgeries import (
 from hypothesis import given
 from hypothesis import strategies as st
 from kept_files import motion
+from landscape_values import double_well
 from proof_files import verdict
 
 from polycorner import Manifold, Polyhedron, files, minimise, simulate, skeleton
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.dynamics import files as run_files
-from polycorner.files import certificates, graphs, skeletons, trajectories
+from polycorner.files import certificates, graphs, landscapes, skeletons, trajectories
 from polycorner.models import textbook
 from polycorner.motion import Checkpoint, checkpoints
 from polycorner.proofs import stationary_points
@@ -54,6 +55,15 @@ def atlas(folder, budget=100, kind="PCG64"):
 
     path = files.save_skeleton(found, folder / "atlas")
     return Kept(path, forge_json(skeletons.KIND), read)
+
+
+def landscape(folder):
+    def read(path):
+        found = files.load_landscape(path)
+        return found.merges, found.loops, [found.depth(k) for k in range(len(found.minima))]
+
+    path = files.save_landscape(double_well(), folder / "landscape")
+    return Kept(path, forge_json(landscapes.KIND), read)
 
 
 def unfinished(folder):
@@ -118,7 +128,8 @@ def search(folder):
     return Kept(folder / "search", forge_search, go_on)
 
 
-KINDS = [certificate, atlas, unfinished, graph, trajectory, run, checkpoint, table, proof, search]
+KINDS = [certificate, atlas, landscape, unfinished, graph, trajectory, run, checkpoint, table]
+KINDS += [proof, search]
 
 
 @pytest.fixture(scope="module", params=KINDS)

@@ -6,6 +6,7 @@ class are called as well.
 
 import api_samples as of
 import numpy as np
+from landscape_values import double_well, tree
 
 import polycorner
 from polycorner import (
@@ -28,13 +29,19 @@ ORIGIN = [0.0, 0.0]
 
 # One value of every public class.
 VALUES = {
+    "Barrier": lambda: double_well().barrier(1, 0),
+    "Landscape": double_well,
+    "Merge": lambda: double_well().merges[0],
+    "Minimum": lambda: double_well().minima[0],
+    "Pass": lambda: double_well().passes[0],
+    "Route": lambda: double_well().passes[0].sides[0].route,
+    "Side": lambda: double_well().passes[0].sides[0],
     "Accelerations": lambda: motion.accelerations(of.system(), of.state()),
     "AllOf": lambda: polyhedra.AllOf(of.X, of.Y),
     "AnyOf": lambda: polyhedra.AnyOf(of.X, of.Y),
     "Arrangement": of.arrangement,
     "Axis": lambda: sweeps.Axis([1.0, 2.0], "mm"),
     "Bar": lambda: of.nerve().bars[0],
-    "Barrier": lambda: of.landscape().barrier(0, 1),
     "Basins": lambda: landscapes.basins(of.landscape(), starts=[[0.5, 0.5]]),
     "Body": of.hexagon,
     "Budget": lambda: skeletons.Budget(10, 5.0),
@@ -81,13 +88,7 @@ VALUES = {
     "Membership": lambda: polycorner.exact_point(of.square(), ORIGIN),
     "Manifold": lambda: of.M,
     "Mass": lambda: bodies.mass_of(of.hexagon()),
-    "Landscape": of.landscape,
-    "Merge": lambda: of.landscape().merges[0],
     "Minima": of.minima,
-    "Minimum": lambda: of.landscape().minima[0],
-    "Pass": lambda: of.landscape().passes[0],
-    "Route": lambda: of.landscape().passes[0].sides[0].route,
-    "Side": lambda: of.landscape().passes[0].sides[0],
     "MinimaMap": of.minima_map,
     "MotionOptions": motion.MotionOptions,
     "NamedStudy": lambda: sweeps.NamedStudy(of.study, {"size": "mm"}, of.study_file(), len),
@@ -141,6 +142,7 @@ VALUES = {
 
 # What a method is called on, where it is not the value of its class.
 OTHERS = {
+    "Landscape.escape": lambda: tree([0], [(1, (0, -1), {"kind": "exit"})], region=True),
     "Manifold.matrix": lambda: polycorner.Manifold.rotation("a"),
     "Manifold.vector": lambda: polycorner.Manifold.sphere("u"),
 }
@@ -183,6 +185,9 @@ CALLS = {
         "box": of.UNIT,
         "rng": 0,
     },
+    "Landscape.barrier": lambda: {"start": 1, "end": 0},
+    "Landscape.depth": lambda: {"start": 1},
+    "Landscape.escape": lambda: {"start": 0},
     "landscapes.found_landscape": lambda: {
         "polyhedron": of.square(),
         "energy": of.energy(),
@@ -247,9 +252,6 @@ CALLS = {
     "Manifold.shift": lambda: Q | {"v": [0.1, 0.1]},
     # proofs
     "prove": lambda: {"certificate": of.certificate(), "digits": 8},
-    "Landscape.barrier": lambda: {"start": 0, "end": 1},
-    "Landscape.depth": lambda: {"start": 0},
-    "Landscape.escape": lambda: {"start": 0},
     "landscapes.basins": lambda: {
         "polyhedron": of.square(),
         "energy": of.energy(),
@@ -378,11 +380,15 @@ CALLS = {
     # files
     "files.load_certificate": lambda: {"path": of.kept("certificate")},
     "files.load_graph": lambda: {"path": of.kept("graph")},
+    "files.load_landscape": lambda: {
+        "path": files.save_landscape(double_well(), of.new("landscape.json"))
+    },
     "files.load_problem": lambda: {"path": of.problem_file()},
     "files.load_skeleton": lambda: {"path": of.kept("skeleton")},
     "files.load_trajectory": lambda: {"path": of.kept("trajectory"), "system": of.system()},
     "files.save_certificate": lambda: {"certificate": of.certificate(), "path": of.new("c.nc")},
     "files.save_graph": lambda: {"skeleton": of.skeleton(), "path": of.new("g.graphml")},
+    "files.save_landscape": lambda: {"landscape": double_well(), "path": of.new("l.json")},
     "files.save_problem": lambda: {
         "path": of.new("p.toml"),
         "polyhedron": of.square(),

@@ -2,6 +2,7 @@
 
 import api_samples as of
 import numpy as np
+from landscape_values import double_well
 
 from polycorner import dumbbells, pictures
 from polycorner.dumbbells.dynamics.bunch import BunchRun
@@ -42,6 +43,8 @@ DUMBBELLS = {
     "MinimaMap.has": lambda: {"kind": of.minima_map().kinds[0]},
     "MinimaMap.pair": lambda: {"i": 0, "j": 0, "k": 0},
     "PairAtlas.kind": lambda: {"corner": of.atlas().skeleton.corners[0]},
+    "RelativePlacements.energy_at": lambda: {"height": 0.1},
+    "RelativePlacements.height": lambda: {"energy": 6.0},
     "RelativePlacements.placement": lambda: {"q": [20.0, 0.0, 0.1, 0.0]},
     "RestRegion.azimuths": lambda: THETA,
     "RestRegion.contains": lambda: BAND,
@@ -145,6 +148,7 @@ DUMBBELLS = {
         "path": of.new("movie.gif"),
         "frames": 1,
     },
+    "dumbbells.pictures.draw_relative": lambda: {"model": dumbbells.RelativePlacements(of.pair())},
     "dumbbells.pictures.write_scene": lambda: {"scene": of.scene(), "path": of.new("scene.glb")},
     "dumbbells.pictures.write_solid": lambda: {
         "atlas": of.atlas(),
@@ -173,6 +177,12 @@ DUMBBELLS = {
     "pictures.draw_cells": lambda: {"proof": of.cell()},
     "pictures.draw_clusters": lambda: {"model": of.spheres(), "points": [of.tetrahedron()]},
     "pictures.draw_critical": lambda: {"model": of.disks(), "configurations": of.critical()},
+    "pictures.draw_landscape": lambda: {"landscape": double_well()},
+    "pictures.draw_landscape_map": lambda: {
+        "landscape": double_well(),
+        "bounds": (-2.0, 2.0, -2.0, 2.0),
+        "resolution": 20,
+    },
     "pictures.draw_motion": lambda: {
         "model": of.spheres(),
         "polyline": [of.tetrahedron()] * 6,
@@ -185,6 +195,13 @@ DUMBBELLS = {
         "resolution": 20,
     },
     "pictures.draw_solid": lambda: {"mesh": of.isosurface().mesh},
+    "pictures.film_route": lambda: {
+        "landscape": double_well(),
+        "route": double_well().passes[0].sides[0].route,
+        "path": of.new("route.gif"),
+        "pictures": lambda axes, point: axes.plot(*point, "o"),
+        "frames": 2,
+    },
     "pictures.isosurface": lambda: {"function": of.ball, "bounds": of.AROUND, "resolution": 8},
     "pictures.place_solid": lambda: {
         "axes": of.axes(),

@@ -251,12 +251,12 @@ def _film(movie: str | None, out: Path | None) -> Path | None:
         return None
     if movie == "" and out is None:
         fail("--movie: expected a file name or --out beside it; got neither")
-    from polycorner.dumbbells.pictures import movies
+    from polycorner.toolkit import check_movie, movie_suffix
 
     if movie == "" and out is not None:
-        return out / f"drum{movies.movie_suffix()}"
+        return out / f"drum{movie_suffix()}"
     with _named_options():
-        movies.check_movie(movie)
+        check_movie(movie)
     return Path(movie)
 
 

@@ -11,6 +11,7 @@ from .motion_strips import draw_motions
 from .movies import write_movie
 from .pair_map import draw_pair_map
 from .placements import forbidden_solid, relative_coordinates, relative_placements
+from .relative import draw_relative
 from .scenes import atlas_scene, drum_scene, glb, pair_scene, write_scene
 from .solid import SolidFacts, relative_corners, relative_curves, solid_facts, write_solid
 from .studies import draw_study
@@ -36,6 +37,7 @@ __all__ = [
     "draw_motions",
     "draw_pair",
     "draw_pair_map",
+    "draw_relative",
     "draw_steady_headings",
     "draw_study",
     "draw_wells",

@@ -44,6 +44,8 @@ of them holds strictly, so that corners are made of contacts alone.
 
 import math
 from dataclasses import dataclass
+from decimal import Decimal, localcontext
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +60,7 @@ from polycorner.toolkit import Array, Checked, cached_property, checks, dot, min
 if TYPE_CHECKING:
     import sympy
 
+DIGITS = 50  # of heights, before they are rounded
 MARGIN = 1.05  # sides of the box over the reach of contacts
 
 
@@ -167,6 +170,52 @@ class RelativePlacements(Checked):
         known = {str(symbol) for symbol in formula.free_symbols}
         sizes = {name: value for name, value in self.parameters.items() if name in known}
         return SmoothFunction("trough", formula, self.manifold, parameters=sizes, unit="mm^2")
+
+    def height(self, energy: float) -> float:
+        """Return how much higher a pair hangs than one on the lowest line, in mm times a weight.
+
+        The height of balls and rods, in mm times the weight of a ball, with the centre of mass
+        below the axis: ``K (rho - d)``, where ``d^2 = rho^2 - E/2`` and ``K`` is 4 and the weights
+        of both rods.  Correct to within the last bit.  In the plane the limit of ``rho`` times
+        that, ``K E / 4``, in mm^2.
+
+        Parameters
+        ----------
+        energy : float
+            A value of :attr:`energy`, in mm^2.
+
+        Raises
+        ------
+        ValueError
+            For a centre of mass above the axis.
+        """
+        pair = self.pair
+        most = math.inf if pair.is_plane else 2 * pair.centre_radius**2
+        value = checks.real("energy", energy, most=most, unit="mm^2")
+        weights = Fraction(4) + 2 * Fraction(pair.rod_weight)
+        if pair.is_plane:
+            return float(weights * Fraction(value) / 4)
+        with localcontext(prec=DIGITS):
+            rho, half = Decimal(pair.centre_radius), Decimal(value) / 2
+            lower = half / (rho + max(rho * rho - half, Decimal(0)).sqrt())
+            return float(Fraction(lower) * weights)
+
+    def energy_at(self, height: float) -> float:
+        """Return the energy of a :meth:`height`, to within rounding.
+
+        Parameters
+        ----------
+        height : float
+            In mm times the weight of a ball, at most that of a centre of mass on the axis; in the
+            plane in mm^2.
+        """
+        pair = self.pair
+        weights = 4 + 2 * pair.rod_weight
+        if pair.is_plane:
+            return 4 * checks.real("height", height, unit="mm^2") / weights
+        most = weights * pair.centre_radius
+        up = checks.real("height", height, most=most, unit="mm") / weights
+        return 2 * up * (2 * pair.centre_radius - up)
 
     @property
     def box(self) -> dict[str, tuple[float, float]]:

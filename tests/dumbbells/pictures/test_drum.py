@@ -18,6 +18,7 @@ from polycorner.dumbbells.pictures.drum import AVERAGE, SINGLE, DrumView, draw_d
 from polycorner.dumbbells.pictures.symbols import HANDS
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import simulate
+from polycorner.pictures import films
 from polycorner.pictures.style import BODIES, save
 
 NOISE = Noise(chatter=0.2, seed=1)
@@ -229,8 +230,8 @@ def test_frames_are_spread_over_the_record(count, most):
 def test_a_movie_that_cannot_be_written_gets_a_sentence(two, tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"^path: expected a file name that ends in \.mp4 or"):
         movies.write_movie(two, tmp_path / "two.avi")
-    monkeypatch.setattr(movies, "can_encode", lambda: False)
-    assert movies.movie_suffix() == ".gif"
+    monkeypatch.setattr(films, "can_encode", lambda: False)
+    assert films.movie_suffix() == ".gif"
     with pytest.raises(ValueError, match=r"^path: .*polycorner\[movies\]"):
         movies.write_movie(two, tmp_path / "two.mp4")
     assert list(tmp_path.iterdir()) == []

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from atlases import kept_atlas
+from mpmath import mp
 
 from polycorner import certify, minimise
 from polycorner.dumbbells import DumbbellPair, RelativePlacements
@@ -45,6 +46,43 @@ def test_energy_is_least_over_rolling_and_grows_with_the_height(model):
         deep = (4 * model.pair.drum_radius - least) / 4  # of the centre of mass under the axis
         least = 2 * (rho**2 - deep**2)
     assert np.allclose(model.energy.value(q), least, rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.7])
+@pytest.mark.parametrize("radius", [math.inf, 125.0, 80.0])
+def test_heights_are_those_of_the_bodies(radius, weight):
+    """Of balls and rods, with the pair rolled to where it hangs lowest, over the lowest line."""
+    model = RelativePlacements(DumbbellPair(*SIZES, radius, weight))
+    pair, rho = model.pair, model.pair.centre_radius
+    for q in placements(model, 24, 40):
+        centres = pair.ball_centres(model.placement(q))
+        weights = 4 + 2 * weight
+        if pair.is_plane:
+            lateral = centres[:, 0] - centres[:, 0].mean()
+            expected = weights / 8 * (lateral**2).sum()
+        else:
+            expected = weights * (rho - math.hypot(*centres.mean(axis=0)[[0, 2]]))
+        found = model.height(float(model.energy.value(q)))
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-10)
+        assert model.energy_at(found) == pytest.approx(model.energy.value(q), rel=1e-9, abs=1e-9)
+
+
+def test_heights_are_correct_to_the_last_bit():
+    model = RelativePlacements(DumbbellPair(*SIZES, 125.0, 0.3))
+    rho = model.pair.centre_radius
+    with mp.workdps(700):
+        weights = 4 + 2 * mp.mpf(0.3)
+        for energy in [0.0, 1e-300, 1e-9, 6.348466742, 18.0, 500.0, -1e-3, 2 * rho**2]:
+            exact = weights * (rho - mp.sqrt(rho**2 - mp.mpf(energy) / 2))
+            assert model.height(energy) == float(exact)
+    assert model.height(0.0) == 0.0
+
+
+@pytest.mark.parametrize(("name", "value"), [("height", 1e6), ("energy_at", 1e6)])
+def test_a_centre_of_mass_above_the_axis_is_refused(name, value):
+    model = RelativePlacements(DumbbellPair(*SIZES, 125.0))
+    with pytest.raises(ValueError, match=r"^(energy|height): expected a number <= "):
+        getattr(model, name)(value)
 
 
 def test_rods_do_not_overlap_where_their_axes_do_not_cross(model):
