@@ -44,7 +44,7 @@ from .pictures.style import BODIES, SHADES, bridged
 from .polyhedra.cones import rank
 from .polyhedra.faces import project, projected
 from .polyhedra.quotients import Quotient
-from .printing import Sheet, Table, facts
+from .printing import Printed, Sheet, Table, facts, number
 from .progress import Progress, silent
 from .skeletons.orbits import Orbits, orbits
 from .spaces.arguments import finite, scalar
@@ -85,6 +85,7 @@ __all__ = [
     "PairContacts",
     "PairLaw",
     "Picture",
+    "Printed",
     "Progress",
     "Quotient",
     "Sheet",
@@ -118,6 +119,7 @@ __all__ = [
     "movie_suffix",
     "nearest",
     "norm",
+    "number",
     "orbits",
     "placed_gaps",
     "placed_stationary",

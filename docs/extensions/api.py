@@ -193,7 +193,7 @@ GROUPS = (
         {
             "dumbbells": "DumbbellPair dyad_minima DyadMinimum pair_minima pair_atlas PairAtlas "
             "RelativePlacements minima_map MinimaMap pair_map PairMap meetings meeting_basins "
-            "placement_basins",
+            "placement_basins pair_landscape PairLandscape",
         },
     ),
     Group(
@@ -202,7 +202,7 @@ GROUPS = (
         {
             "dumbbells": "heading_curve paper_heading plane_heading_formula heading_error_bar "
             "ErrorBar pair_sensitivity critical_length critical_rod_radius long_rod_length "
-            "plane_critical_formula",
+            "plane_critical_formula plane_depth_formula",
         },
     ),
     Group(

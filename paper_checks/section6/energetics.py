@@ -7,7 +7,7 @@ import numpy as np
 import sympy
 
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.section6 import corner, ends, grip
+from paper_checks.section6 import corner, depths, ends, grip
 from paper_checks.section6.corner import BALL, LENGTH, ROD, sizes
 from paper_checks.section6.experiment import (
     BUNCH,
@@ -299,4 +299,5 @@ CLAIMS = (
         partial(minimum_below, least=2.9),
     ),
     *grip.CLAIMS,
+    *depths.CLAIMS,
 )

@@ -4,6 +4,7 @@ from .imperfections import OutOfRound, Shaking, UnevenFriction, Wobble
 from .pair import DumbbellPair
 from .rigid import RigidDumbbells
 from .statics.critical import critical_length, critical_rod_radius, plane_critical_formula
+from .statics.depths import PairLandscape, pair_landscape, plane_depth_formula
 from .statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
 from .statics.keel import Keel, RestRegion
 from .statics.meetings import meeting_basins, meetings, placement_basins
@@ -22,6 +23,7 @@ __all__ = [
     "MinimaMap",
     "OutOfRound",
     "PairAtlas",
+    "PairLandscape",
     "PairMap",
     "RelativePlacements",
     "RestRegion",
@@ -39,11 +41,13 @@ __all__ = [
     "meetings",
     "minima_map",
     "pair_atlas",
+    "pair_landscape",
     "pair_map",
     "pair_minima",
     "pair_sensitivity",
     "paper_heading",
     "placement_basins",
     "plane_critical_formula",
+    "plane_depth_formula",
     "plane_heading_formula",
 ]

@@ -106,7 +106,7 @@ class Sorted:
         self, found: CriticalList, exits: frozenset[str], room: Curves, cap: float
     ) -> None:
         self.found, self.problem, self.exits = found, found.problem, exits
-        self.curves = room
+        self.curves, self.cap = room, cap
         self.functions = BoxFunctions(found.problem.functions, found.problem.polyhedron.manifold)
         self.descents = Descents(room, found.domain.free)
         self.nodes: list[Node] = []
@@ -114,10 +114,7 @@ class Sorted:
         self.candidates: list[Candidate] = []
         self.euler: int | None = 0
         for point in found.points:
-            if (
-                bounds_of(room, self.spot(point.point.lower, point.point.upper, frozenset()))[0]
-                <= cap
-            ):
+            if self._asked(point.point.lower, point.point.upper):
                 self._sort(point)
         for box in found.undecided:
             self._undecided(box[0], box[1])
@@ -166,14 +163,19 @@ class Sorted:
         """Return bounds of the energy on a box."""
         return bounds_of(self.curves, spot)
 
+    def _asked(self, lower: Array, upper: Array) -> bool:
+        return self.energy(self.spot(lower, upper, frozenset()))[0] <= self.cap
+
     def _sort(self, one: CriticalPoint) -> None:
         p, d = one.point, self.problem.polyhedron
         spot = self.sharp(p, one.zeros, p.active)
         signs = self._signs(spot)
         held = frozenset(d.names.index(name) for name in p.active)
-        pieces = d.signs_to_pieces(signs or [])
+        # The set grows with each function, and depends on those in one of the pieces alone.
+        unknown = one.unknown.union(i for i, sign in enumerate(signs) if sign is None)
+        pieces = d.signs_to_pieces([0 if i in unknown else s or 0 for i, s in enumerate(signs)])
         matter = frozenset().union(*pieces) if pieces else frozenset()
-        if one.is_open or one.unknown or signs is None:
+        if one.is_open or matter & unknown:
             self._undecided(p.lower, p.upper, p.active, p.orbit)
         elif len(pieces) == 1 and p.index == 0 and pieces[0] >= held:
             self._minimum(spot, p.active, p.orbit)
@@ -183,8 +185,8 @@ class Sorted:
         elif matter == held:
             self._regular(spot, one, held, pieces)
 
-    def _signs(self, spot: Spot) -> list[int] | None:
-        """Return the signs of all inequalities at a point, None if one is not decided."""
+    def _signs(self, spot: Spot) -> list[int | None]:
+        """Return the signs of all inequalities at a point, None for those that are not decided."""
         low, high = self.functions.values(
             *(np.array([[f(x) for x in spot.box]]) for f in (under, above))
         )
@@ -192,7 +194,7 @@ class Sorted:
             values = self.curves.formulas.values(
                 Box(list(spot.box)), range(self.problem.inequalities)
             )
-            signs = [
+            return [
                 0
                 if i in spot.zeros
                 else 1
@@ -202,7 +204,6 @@ class Sorted:
                 else None
                 for i, v in enumerate(values)
             ]
-        return None if None in signs else [sign or 0 for sign in signs]
 
     def _regular(
         self, spot: Spot, one: CriticalPoint, held: frozenset[int], pieces: Sequence[Piece]
@@ -292,6 +293,8 @@ class Sorted:
             z = list(place.z)
             lower, upper = domain.lower.copy(), domain.upper.copy()
             lower[z], upper[z] = place.sharp_lower, place.sharp_upper
+            if not self._asked(lower, upper):
+                continue
             if place.sample is None:
                 self._undecided(lower, upper)
                 continue

@@ -97,6 +97,7 @@ VALUES = {
     "OutOfRound": lambda: dumbbells.OutOfRound({2: 0.1}, {2: 0.0}),
     "PairAtlas": of.atlas,
     "PairFriction": of.pair_friction,
+    "PairLandscape": of.pair_landscape,
     "PairMap": of.pair_map,
     "ParameterCell": lambda: of.cell().cells[0],
     "Part": lambda: of.hexagon().parts[""],

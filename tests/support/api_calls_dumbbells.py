@@ -43,6 +43,7 @@ DUMBBELLS = {
     "MinimaMap.has": lambda: {"kind": of.minima_map().kinds[0]},
     "MinimaMap.pair": lambda: {"i": 0, "j": 0, "k": 0},
     "PairAtlas.kind": lambda: {"corner": of.atlas().skeleton.corners[0]},
+    "PairLandscape.height": lambda: {"energy": (1.0, 2.0)},
     "RelativePlacements.energy_at": lambda: {"height": 0.1},
     "RelativePlacements.height": lambda: {"energy": 6.0},
     "RelativePlacements.placement": lambda: {"q": [20.0, 0.0, 0.1, 0.0]},
@@ -74,6 +75,7 @@ DUMBBELLS = {
     "dumbbells.pair_minima": lambda: {"pair": of.pair(), "starts": 2},
     "dumbbells.pair_sensitivity": lambda: {"pair": of.pair()},
     "dumbbells.paper_heading": lambda: {"pair": of.pair()},
+    "dumbbells.pair_landscape": lambda: {"pair": of.pair(), "max_seconds": 0.01},
     "dumbbells.plane_critical_formula": dict,
     # studies
     "studies.bunch": lambda: {"start": 0, "count": 2, "duration": 0.1},

@@ -37,7 +37,8 @@ REASONS = {
     ENUMERATION: """Completeness Consistency End Entrapment EventKind LocalType Mobility Status
         Verdict""",
     ERROR: "NonsmoothWarning PolycornerError PortTakenError SolverError SweepError",
-    NOTHING: "dumbbells.plane_heading_formula motion.time_symbol",
+    NOTHING: """dumbbells.plane_depth_formula dumbbells.plane_heading_formula
+        motion.time_symbol""",
     "reads what described() or record() told": """CriticalSearch.restored OutOfRound.restored
         Shaking.restored UnevenFriction.restored Wobble.restored""",
     "runs until it is interrupted": "viewer.serve",

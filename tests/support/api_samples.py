@@ -72,6 +72,7 @@ element = cache(lambda: polyhedra.Element(mirrored, {"left": "right", "right": "
 symmetry = cache(lambda: pc.Symmetry(elements=(element(),)))
 pair = cache(lambda: dumbbells.DumbbellPair(16.0, 3.0, 1.5, 125.0))
 atlas = cache(lambda: dumbbells.pair_atlas(pair(), rng=0))
+pair_landscape = cache(lambda: dumbbells.pair_landscape(pair(), max_seconds=0.01))
 drum = cache(lambda: dumbbells.DumbbellDrum(count=2))
 
 

@@ -283,7 +283,8 @@ def escape_barrier(pair: DumbbellPair, chirality: Chirality = "R") -> float | No
     """Return the energy of the pass above the corner; None if the corner is no minimum.
 
     In mm of height, weights of balls counting one (in the plane mm^2, times ``1/rho``).  It is an
-    upper bound of the energy that frees the pair: other ways out are not examined.
+    upper bound of the energy that frees the pair; that no other way out is lower is proved for a
+    pair by :func:`~polycorner.dumbbells.pair_landscape`.
     """
     rest, top = _corner(pair, chirality), mountain_pass(pair, chirality)
     if not rest.is_minimum or top.verdict is Verdict.OUTSIDE:

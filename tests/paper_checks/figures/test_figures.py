@@ -19,6 +19,7 @@ NAMES = [
     "heading_length",
     "faces",
     "nested",
+    "passes",
     "solid",
     "torque",
     "rest_regions",
@@ -39,7 +40,8 @@ def every(names=NAMES):
 def test_the_catalogue():
     assert set(FIGURES) == set(NAMES)
     assert all(figure.name == name for name, figure in FIGURES.items())
-    assert {n for n, figure in FIGURES.items() if figure.slow} == {"single_history", "dyad_history"}
+    slow = {n for n, figure in FIGURES.items() if figure.slow}
+    assert slow == {"single_history", "dyad_history", "passes"}
 
 
 @pytest.mark.parametrize("name", every())
