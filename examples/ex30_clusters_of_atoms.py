@@ -5,7 +5,7 @@ Clusters of atoms and the passes between them
 Six atoms that attract each other have two shapes at rest, and three passes between copies of these.
 
 Atoms with the potential of Lennard-Jones are at rest as an octahedron or, a little higher, as three
-tetrahedra in a row.  ``found_landscape`` descends from random clusters, walks uphill from them and
+tetrahedra in a row.  ``search_landscape`` descends from random clusters, walks uphill from them and
 from the minima, and goes down on both sides of each saddle.  Shapes are told apart up to
 congruence and the order of the atoms, so that a pass may lead from a shape to itself: atoms have
 then changed places.  The lowest one joins the two shapes; so the row of tetrahedra is left by
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from polycorner.landscapes import Landscape, found_landscape
+from polycorner.landscapes import Landscape, search_landscape
 from polycorner.models import LennardJones, SphereCluster
 
 ATOMS, STARTS = 6, 60
@@ -29,7 +29,7 @@ ATOMS, STARTS = 6, 60
 def main() -> Landscape:
     """Return minima and passes of six atoms."""
     model, rng = LennardJones(ATOMS), np.random.default_rng(1)
-    return found_landscape(
+    return search_landscape(
         model.polyhedron,
         model.energy,
         starts=model.starts(rng, STARTS),

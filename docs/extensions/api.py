@@ -90,7 +90,7 @@ GROUPS = (
         "Chart a landscape",
         "How deep minima are, over which passes they are left, shares of basins.",
         {
-            "landscapes": "landscape found_landscape Landscape Minimum Pass Side Merge Barrier "
+            "landscapes": "landscape search_landscape Landscape Minimum Pass Side Merge Barrier "
             "Route paved_barrier Paving basins Basins minimum_of",
         },
     ),

@@ -108,11 +108,11 @@ def searched(polyhedron: "Polyhedron", energy: Any, **options: Any) -> "Landscap
 
     Proved in a ``box``, or found from ``starts``.
     """
-    from polycorner.landscapes import found_landscape
     from polycorner.landscapes import landscape as proved
+    from polycorner.landscapes import search_landscape
 
     try:
-        search = found_landscape if "starts" in options else proved
+        search = search_landscape if "starts" in options else proved
         return search(polyhedron, energy, **options)
     except ValueError as error:
         fail(str(error))

@@ -3,7 +3,7 @@ from .basins import Basins, basins, minimum_of
 from .enumeration import landscape
 from .paving import Paving, paved_barrier
 from .routes import Route
-from .saddles import found_landscape
+from .saddles import search_landscape
 
 __all__ = [
     "Barrier",
@@ -16,8 +16,8 @@ __all__ = [
     "Route",
     "Side",
     "basins",
-    "found_landscape",
     "landscape",
     "minimum_of",
     "paved_barrier",
+    "search_landscape",
 ]

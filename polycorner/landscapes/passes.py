@@ -169,13 +169,10 @@ class Sorted:
     def _sort(self, one: CriticalPoint) -> None:
         p, d = one.point, self.problem.polyhedron
         spot = self.sharp(p, one.zeros, p.active)
-        signs = self._signs(spot)
         held = frozenset(d.names.index(name) for name in p.active)
-        # The set grows with each function, and depends on those in one of the pieces alone.
-        unknown = one.unknown.union(i for i, sign in enumerate(signs) if sign is None)
-        pieces = d.signs_to_pieces([0 if i in unknown else s or 0 for i, s in enumerate(signs)])
-        matter = frozenset().union(*pieces) if pieces else frozenset()
-        if one.is_open or matter & unknown:
+        pieces, sure = self._pieces(spot, one.unknown)
+        matter = frozenset[int]().union(*pieces)
+        if one.is_open or not sure:
             self._undecided(p.lower, p.upper, p.active, p.orbit)
         elif len(pieces) == 1 and p.index == 0 and pieces[0] >= held:
             self._minimum(spot, p.active, p.orbit)
@@ -184,6 +181,16 @@ class Sorted:
             self._undecided(p.lower, p.upper, p.active, p.orbit)
         elif matter == held:
             self._regular(spot, one, held, pieces)
+
+    def _pieces(self, spot: Spot, unknown: frozenset[int]) -> tuple[list[Piece], bool]:
+        """Return the pieces of the set at a point, and whether they are sure."""
+        signs = self._signs(spot)
+        unknown = unknown.union(i for i, sign in enumerate(signs) if sign is None)
+        pieces = self.problem.polyhedron.signs_to_pieces(
+            [0 if i in unknown else s or 0 for i, s in enumerate(signs)]
+        )
+        # The set grows with each function, and depends on those in one of the pieces alone.
+        return pieces, not any(piece & unknown for piece in pieces)
 
     def _signs(self, spot: Spot) -> list[int | None]:
         """Return the signs of all inequalities at a point, None for those that are not decided."""
@@ -339,12 +346,11 @@ class Sorted:
             zeros = frozenset(d.names.index(name) for name in (*p.active, *p.redundant)) | {g}
             spot = self.sharp(p, zeros, (*p.active, wall))
             plain = p.index == 0 and not p.redundant and lam is not None
-            signs = self._signs(spot)
-            pieces = [] if signs is None else d.signs_to_pieces(signs)
-            if lam is not None and plain and lam[0] > 0 and len(pieces) == 1:
+            pieces, sure = self._pieces(spot, frozenset())
+            if lam is not None and plain and sure and lam[0] > 0 and len(pieces) == 1:
                 continue  # a minimum of the region itself, at its wall
             starts = []
-            if lam is not None and lam[1] < 0:
+            if lam is not None and sure and lam[1] < 0:
                 ways = [(piece, self._into(spot, piece)) for piece in pieces]
                 starts = [(False, piece, way) for piece, way in ways if way is not None][:1]
             self.candidates.append(

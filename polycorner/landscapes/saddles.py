@@ -628,7 +628,7 @@ def _minimum(node: Node) -> Minimum:
     return Minimum(node.point, (found.energy, found.energy), found.active, kind, node.orbit)
 
 
-def found_landscape(  # noqa: PLR0913 - all but two are options
+def search_landscape(  # noqa: PLR0913 - all but two are options
     polyhedron: Polyhedron,
     energy: "Energy",
     *,
@@ -681,7 +681,7 @@ def found_landscape(  # noqa: PLR0913 - all but two are options
     >>> M = Manifold.euclidean("x y")
     >>> x, y = M.symbols
     >>> D = Polyhedron(M, {"disc": 4 - x**2 - y**2})
-    >>> found = found_landscape(D, (x**2 - 1) ** 2 + x / 4 + y**2, starts=50, box=[(-2, 2)] * 2)
+    >>> found = search_landscape(D, (x**2 - 1) ** 2 + x / 4 + y**2, starts=50, box=[(-2, 2)] * 2)
     >>> len(found.minima), [p.point.round(3).tolist() for p in found.passes]
     (2, [[0.063, 0.0]])
     """

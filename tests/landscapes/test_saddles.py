@@ -11,7 +11,7 @@ from oracles_search import flooded
 from scipy.optimize import minimize
 
 from polycorner import AnyOf, Manifold, Polyhedron, Symmetry, certify
-from polycorner.landscapes import found_landscape
+from polycorner.landscapes import search_landscape
 from polycorner.landscapes.saddles import crossing_at, search_passes, sides_of
 from polycorner.minimisation.problem import pose
 from polycorner.models import LennardJones
@@ -72,7 +72,7 @@ def assert_flood_agrees(landscape, polyhedron, energy, box, *, cells, error):
 
 
 def test_muller_brown_has_the_published_minima_and_saddles():
-    found = found_landscape(window(), muller_brown(), box=WINDOW, starts=60)
+    found = search_landscape(window(), muller_brown(), box=WINDOW, starts=60)
     assert [m.energy[0] for m in found.minima] == pytest.approx(
         [-146.700, -108.167, -80.768], abs=1e-3
     )
@@ -85,7 +85,7 @@ def test_muller_brown_has_the_published_minima_and_saddles():
 def test_a_wall_across_a_pass_moves_it():
     energy = muller_brown()
     D = window(pin=(X + 0.6) ** 2 + (Y - 0.5) ** 2 - sp.Rational(1, 25))
-    found = found_landscape(D, energy, box=WINDOW, starts=80)
+    found = search_landscape(D, energy, box=WINDOW, starts=80)
     assert_flood_agrees(found, D, energy, WINDOW, cells=500, error=0.6)
     assert ("pin",) in {p.active for p in found.passes}
 
@@ -97,7 +97,7 @@ STATIONARY = {5: (1, 2), 6: (2, 3), 7: (4, 12)}
 @pytest.mark.parametrize(("count", "starts"), [(5, 40), (6, 60), (7, 150)])
 def test_clusters_of_atoms_have_the_published_numbers_of_minima_and_saddles(count, starts):
     model, rng = LennardJones(count), np.random.default_rng(1)
-    found = found_landscape(
+    found = search_landscape(
         model.polyhedron,
         model.energy,
         starts=model.starts(rng, starts),
@@ -157,7 +157,7 @@ def test_wells_among_discs_and_triangles_merge_where_a_grid_is_flooded(seed):
     sides = [(X - u) * np.cos(a) + (Y - v) * np.sin(a) - 0.15 for a in turn]
     parts["triangle"] = AnyOf(*sides)
     D = Polyhedron(PLANE, parts)
-    found = found_landscape(D, energy, box=SQUARE, starts=80, rng=seed)
+    found = search_landscape(D, energy, box=SQUARE, starts=80, rng=seed)
     assert_flood_agrees(found, D, energy, SQUARE, cells=400, error=0.02)
 
 
@@ -186,7 +186,7 @@ def test_sums_over_coordinates_have_the_passes_of_their_summands(seed):
         for i in range(len(kinds))
         for c in itertools.product(*(kind[i == j] for j, kind in enumerate(kinds)))
     ]
-    found = found_landscape(
+    found = search_landscape(
         Polyhedron(space, walls), energy, box=[(w, 2) for _, w in summands], starts=100
     )
     assert sorted(m.energy[0] for m in found.minima) == pytest.approx(sorted(lows), abs=1e-6)
@@ -201,7 +201,7 @@ def test_the_tip_of_an_obstacle_is_a_pass_of_the_union():
     over = AnyOf(Y - X / 2 - sp.Rational(3, 10), Y + X - sp.Rational(2, 5))
     D = Polyhedron(PLANE, {"over": over, "floor": Y, "left": X + 3, "right": 3 - X})
     energy = Y + X**2 / 10 + 3 * X / 100
-    found = found_landscape(D, energy, box=[(-3, 3), (0, 2)], starts=40)
+    found = search_landscape(D, energy, box=[(-3, 3), (0, 2)], starts=40)
     (tip,) = found.passes
     assert tip.kind == "tip"
     assert tip.point == pytest.approx([1 / 15, 1 / 3])
@@ -220,7 +220,7 @@ def test_weak_contacts_make_three_sides_or_none(coupling, sides):
     assert len(starts) == sides
     if sides:
         assert sorted(int(abs(q).argmax()) for q in starts) == [0, 1, 2]
-        found = found_landscape(D, energy, box=[(0, 2)] * 3, starts=60)
+        found = search_landscape(D, energy, box=[(0, 2)] * 3, starts=60)
         heights = {round(p.energy[0], 9) for p in found.passes if len(p.sides) == 3}
         assert heights == {0}
         assert len(found.minima) == 3
@@ -288,7 +288,7 @@ def test_images_under_a_finite_group_are_listed_as_orbits():
     energy = (X**2 - 1) ** 2 + (Y**2 - 1) ** 2
     group = Symmetry(elements=[turns(k) for k in (1, 2, 3)])
     plain, folded = (
-        found_landscape(D, energy, box=SQUARE, starts=60, symmetry=s) for s in (None, group)
+        search_landscape(D, energy, box=SQUARE, starts=60, symmetry=s) for s in (None, group)
     )
     for one in (plain, folded):
         assert (len(one.minima), len(one.passes), len(one.merges)) == (4, 4, 3)
@@ -302,7 +302,7 @@ def test_images_under_a_finite_group_are_listed_as_orbits():
 
 def test_routes_fall_from_the_pass_inside_the_set():
     D = window(pin=(X + 0.6) ** 2 + (Y - 0.5) ** 2 - sp.Rational(1, 25))
-    found = found_landscape(D, muller_brown(), box=WINDOW, starts=40)
+    found = search_landscape(D, muller_brown(), box=WINDOW, starts=40)
     for p in found.passes:
         for s in p.sides:
             assert (np.diff(s.route.energies) <= 1e-6).all()
@@ -312,9 +312,9 @@ def test_routes_fall_from_the_pass_inside_the_set():
 
 
 def test_nothing_above_a_cap_is_listed():
-    found = found_landscape(window(), muller_brown(), box=WINDOW, starts=60, cap=-75)
+    found = search_landscape(window(), muller_brown(), box=WINDOW, starts=60, cap=-75)
     assert (len(found.minima), len(found.passes)) == (3, 0)
-    found = found_landscape(window(), muller_brown(), box=WINDOW, starts=60, cap=-90)
+    found = search_landscape(window(), muller_brown(), box=WINDOW, starts=60, cap=-90)
     assert (len(found.minima), found.cap) == (2, -90)
 
 
@@ -324,7 +324,7 @@ def test_a_search_that_is_interrupted_returns_what_it_found():
         assert note
         raise KeyboardInterrupt
 
-    found = found_landscape(window(), muller_brown(), box=WINDOW, starts=100, progress=stop)
+    found = search_landscape(window(), muller_brown(), box=WINDOW, starts=100, progress=stop)
     assert len(found.minima) == 3
 
 
@@ -332,4 +332,4 @@ def test_wrong_arguments_are_refused_by_name():
     D, energy = Polyhedron(PLANE, FRAME), X**2 + Y**2
     for name, wrong in (("cap", "high"), ("symmetry", "yes"), ("box", None), ("starts", 0)):
         with pytest.raises((TypeError, ValueError), match=name):
-            found_landscape(D, energy, **{"box": SQUARE, name: wrong})
+            search_landscape(D, energy, **{"box": SQUARE, name: wrong})

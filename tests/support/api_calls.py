@@ -189,7 +189,7 @@ CALLS = {
     "Landscape.barrier": lambda: {"start": 1, "end": 0},
     "Landscape.depth": lambda: {"start": 1},
     "Landscape.escape": lambda: {"start": 0},
-    "landscapes.found_landscape": lambda: {
+    "landscapes.search_landscape": lambda: {
         "polyhedron": of.square(),
         "energy": of.energy(),
         "starts": 2,
