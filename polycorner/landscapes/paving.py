@@ -163,7 +163,8 @@ def paved_barrier(
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     d = problem.polyhedron
     found = domain(d.manifold, box)
-    limited = d.intersected(region)
+    with checks.about("region"):
+        limited = d.intersected(region)
     exits = len(limited.functions) - len(d.functions)
     if walled and not (ends or exits):
         checks.refuse("ends", "an end, or a region or a box that can be left", "none")

@@ -1,12 +1,14 @@
 """Landscapes whose minima, passes and barriers are known by hand."""
 
 from collections.abc import Callable
+from heapq import heappop, heappush
 from itertools import pairwise
 from math import inf
 
 import numpy as np
 import pytest
 import sympy
+from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, Symmetry
@@ -342,11 +344,11 @@ def test_an_interrupted_search_bounds_from_below() -> None:
         assert not found.complete or most > 100
         for k, m in enumerate(found.minima):
             if m.point[0] > 0:
-                assert found.depth(k)[0] <= truth[1][1]  # type: ignore[index]
+                assert found.depth(k)[0] <= truth[1][1]
             elif not found.complete:
                 assert found.depth(k)[0] < inf
         if len(found.minima) == 2:
-            assert found.barrier(0, 1).lower <= truth[0].upper  # type: ignore[union-attr]
+            assert found.barrier(0, 1).lower <= truth[0].upper
 
 
 def test_a_lower_minimum_that_is_not_smooth() -> None:
@@ -402,3 +404,73 @@ def test_wrong_arguments(wrong: dict[str, object], match: str) -> None:
     call: Callable[..., Landscape] = landscape
     with pytest.raises((TypeError, ValueError), match=match):
         call(DISC, WELLS, **given)
+
+
+# ------------------------------------------------------------------------------------ flood fill
+
+GRID = np.linspace(-2.05, 2.05, 240)
+
+
+def flooded(heights: NDArray[np.float64], start: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the least height of a way of cells that share sides, from one to every other one."""
+    least = np.full(heights.shape, inf)
+    least[start] = heights[start]
+    waiting = [(heights[start], start)]
+    while waiting:
+        height, (i, j) = heappop(waiting)
+        for there in ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)):
+            if max(there) < len(heights) and min(there) >= 0:
+                new = max(height, heights[there])
+                if new < least[there]:
+                    least[there] = new
+                    heappush(waiting, (new, there))
+    return least
+
+
+def obstacles(rng: np.random.Generator) -> tuple[Polyhedron, sympy.Expr]:
+    """Return a disc without some triangles and discs, and an energy with some wells."""
+
+    def exact(value: float) -> sympy.Rational:
+        return sympy.Rational(round(1000 * float(value)), 1000)
+
+    parts: list[object] = [4 - X**2 - Y**2]
+    energy = exact(rng.uniform(-0.3, 0.3)) * Y + exact(rng.uniform(0, 0.3)) * X
+    for _ in range(3):
+        x, y = (exact(v) for v in rng.uniform(-1.3, 1.3, 2))
+        width, depth = exact(rng.uniform(2, 5)), exact(rng.uniform(0.5, 1.5))
+        energy -= depth * sympy.exp(-width * ((X - x) ** 2 + (Y - y) ** 2) / 2)
+        u, v = X - exact(rng.uniform(-1, 1)), Y - exact(rng.uniform(-1, 1))
+        r, turn = exact(rng.uniform(0.2, 0.45)), rng.uniform(0, 7)
+        turns = [(exact(np.cos(turn + k)), exact(np.sin(turn + k))) for k in (0, 2.0944, 4.1888)]
+        corner = AnyOf(*[c * u + s * v - r / 2 for c, s in turns])
+        parts.append(corner if rng.random() < 0.6 else u**2 + v**2 - r**2)
+    return Polyhedron(M, parts), energy
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_flood_fill(seed: int) -> None:
+    """Barriers among obstacles are those of a grid, as far as its cells can tell."""
+    d, energy = obstacles(np.random.default_rng(seed))
+    found = landscape(d, energy, box=[(-2.2, 2.2)] * 2)
+    assert found.complete
+    assert len(found.minima) > 1
+    points = np.stack(np.meshgrid(GRID, GRID, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside = np.asarray(d.implicit(points)) >= 0
+    heights = np.where(inside, found.problem.energy.value(points), inf)
+    side = len(GRID)
+    cells = []
+    for m in found.minima:
+        near = np.flatnonzero(
+            inside & (abs(points - m.point).max(axis=1) < 3 * (GRID[1] - GRID[0]))
+        )
+        best = near[abs(heights[near] - m.energy[0]).argmin()]
+        cells.append(divmod(int(best), side))
+    room = 0.05  # what cells are too coarse for
+    for a, cell in enumerate(cells):
+        least = flooded(heights.reshape(side, side), cell)
+        for b in range(a):
+            barrier, grid = found.barrier(a, b), float(least[cells[b]])
+            assert barrier.upper - barrier.lower < 1e-9
+            assert barrier.lower <= grid + room
+            deep = grid - max(found.minima[k].energy[1] for k in (a, b)) > room
+            assert not deep or grid == inf or grid - room <= barrier.upper

@@ -40,7 +40,7 @@ def holds(tree: object, signs: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]
     """Whether a tree holds, by which of its leaves do."""
     if isinstance(tree, int):
         return signs[tree]
-    union, children = tree  # type: ignore[misc]
+    union, children = tree
     parts = [holds(child, signs) for child in children]
     return reduce(np.logical_or if union else np.logical_and, parts)
 
@@ -53,7 +53,7 @@ def polyhedron(tree: object, names: str) -> Polyhedron:
     def part(tree: object) -> object:
         if isinstance(tree, int):
             return functions[tree]
-        union, children = tree  # type: ignore[misc]
+        union, children = tree
         return (AnyOf if union else AllOf)(*map(part, children))
 
     return Polyhedron(manifold, [part(tree)])

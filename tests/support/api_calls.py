@@ -101,6 +101,7 @@ VALUES = {
     "PairMap": of.pair_map,
     "ParameterCell": lambda: of.cell().cells[0],
     "Part": lambda: of.hexagon().parts[""],
+    "Paving": of.paving,
     "PeriodicPacking": lambda: models.PeriodicPacking.bidisperse(24),
     "Pinball": models.Pinball,
     "PointsOnSphere": lambda: models.PointsOnSphere(4, "tammes"),
@@ -272,6 +273,13 @@ CALLS = {
     "Proof.enclose": lambda: {"expression": of.X + of.Y},
     "CornerList.save": lambda: {"path": of.new("corners.zip")},
     "StationaryList.save": lambda: {"path": of.new("points.zip")},
+    # landscapes
+    "landscapes.paved_barrier": lambda: {
+        "problem": of.certificate().problem,
+        "box": of.UNIT,
+        "start": [0.5, 0.5],
+        "ends": [[0.25, 0.25]],
+    },
     # skeletons
     "skeleton": lambda: {"polyhedron": of.square(), "starts": [[0.5, 0.5]]},
     "skeletons.examine_faces": lambda: {"skeleton": of.skeleton()},

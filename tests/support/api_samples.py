@@ -56,6 +56,9 @@ def contact_family():
 proof = cache(lambda: pc.prove(certificate(), digits=8))
 corner_list = cache(lambda: proofs.corners(square(), box=UNIT))
 stationary_list = cache(lambda: proofs.stationary_points(square(), energy(), box=UNIT))
+paving = cache(
+    lambda: landscapes.paved_barrier(certificate().problem, UNIT, [0.5, 0.5], max_boxes=9)
+)
 cell = cache(lambda: pc.prove(certificate(), digits=8, parameters={"a": (1.9, 2.1)}))
 ridge = cache(lambda: pc.Polyhedron(M, {"sides": 4 - X**2, "bottom": Y, "top": 1 - Y}))
 RIDGE = {"energy": (X**2 - 1) ** 2 + X / 4 + Y + Y**2, "box": {"x": (-3.0, 3.0), "y": (-1.0, 2.0)}}

@@ -94,6 +94,7 @@ class PairLandscape(Checked, Printed):
     pair: DumbbellPair
     landscape: Landscape
 
+    @checked
     def height(self, energy: Bounds) -> Bounds:
         """Return bounds of the height above ``G`` that belongs to an energy of the landscape."""
         return max(self._height(energy[0], -math.inf), 0.0), self._height(energy[1], math.inf)
