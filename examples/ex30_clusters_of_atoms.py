@@ -41,7 +41,7 @@ def main() -> Landscape:
 def draw(found: Landscape, path: Path) -> Path:
     from polycorner.pictures import draw_clusters, save
 
-    points = np.array([one.point for one in (*found.minima, *found.passes)])
+    points = np.array([*(m.point for m in found.minima), *(p.point for p in found.passes)])
     shapes = [f"minimum {m.energy[0]:.3f}" for m in found.minima]
     shapes += [f"pass {p.energy[0]:.3f}" for p in found.passes]
     return save(draw_clusters(SphereCluster(ATOMS), points, labels=shapes), path)

@@ -167,6 +167,12 @@ class Grid:
         c = self.curved
         return a * a * c[:, 0] + 2 * a * b * c[:, 1] + b * b * c[:, 2]
 
+    def room(self) -> Array:
+        """Return how much functions may differ in a cell from their values at the node."""
+        half = self.steps / 2
+        slope = abs(self.jets[:, 1]) * half[0] + abs(self.jets[:, 2]) * half[1]
+        return slope + self.bend(half) / 2
+
     def below(self, seeds: Sequence[Array], leave: bool = False, stay: bool = False) -> Flood:
         """Flood cells that cover the set.
 
@@ -179,9 +185,7 @@ class Grid:
         stay : bool
             Whether the region alone is flooded.
         """
-        half = self.steps / 2
-        slope = abs(self.jets[:, 1]) * half[0] + abs(self.jets[:, 2]) * half[1]
-        room = slope + self.bend(half) / 2
+        room = self.room()
         value, m = self.jets[:, 0], len(self.chart.functions)
         meets = self.chart.inside((value + room)[1:])
         most = (value + room)[1 + m :]
@@ -220,6 +224,16 @@ class Grid:
         extra = [(node, k) for k, q in enumerate(seeds) for node in self._reached(q, weight)]
         gone = kept & (value[1 + m :] <= 0).any(axis=0) if leave else None
         return self._flooded(weight, links, extra, len(seeds), gone)
+
+    def euler(self, cap: float) -> int | None:
+        """Return the Euler characteristic of the set up to an energy, if inner and outer agree."""
+        value = self.jets[:, 0]
+        room = self.room()
+        outer = self.chart.inside((value + room)[1:]) & (value[0] - room[0] <= cap)
+        inner = self.chart.inside((value - room)[1:]) & (value[0] + room[0] <= cap)
+        found = {_euler(np.pad(cells, [(0, 1 - c) for c in self.chart.around]))
+                 for cells in (outer, inner)}  # fmt: skip
+        return found.pop() if len(found) == 1 and not self.chart.poles else None
 
     def _node(self, q: Array) -> int:
         """Return the node whose cell contains a point."""
@@ -291,6 +305,13 @@ class Grid:
         order = order[np.isfinite(heights[order])]
         found, stray = _merged(every[order], heights[order], born, count)
         return Flood(joined(count, found), stray)
+
+
+def _euler(cells: Array) -> int:
+    """Return vertices less edges plus cells of a union of closed cells, around both ends."""
+    along = cells | np.roll(cells, 1, axis=0), cells | np.roll(cells, 1, axis=1)
+    vertices = along[0] | np.roll(along[0], 1, axis=1)
+    return int(vertices.sum()) - int(along[0].sum() + along[1].sum()) + int(cells.sum())
 
 
 def joined(count: int, links: Any) -> Array:

@@ -53,6 +53,8 @@ class Truth:
         The energies of all points that can be stationary.
     saddles : sequence of (d,) arrays
         Points that are passes for certain, loops among them.
+    chart : Chart or None
+        A set in two coordinates that the sublevel sets retract to.
     """
 
     points: Array
@@ -62,6 +64,12 @@ class Truth:
     within: Heights = field(default_factory=dict)
     values: Array | None = None
     saddles: Sequence[Array] = ()
+    chart: Chart | None = None
+
+    def euler(self, cap: float) -> int | None:
+        """Return the Euler characteristic up to an energy, if it is known."""
+        known = self.chart is not None and not self.chart.region
+        return Grid(self.chart, NODES).euler(cap) if known else None
 
     def height(self, a: int, b: int) -> tuple[float, ...]:
         """Return the energies at which two minima may be joined."""
@@ -240,7 +248,7 @@ def known_on(chart: Chart, nodes: int = NODES) -> Truth:
     low, high = np.array(chart.sides).T
     turns = np.where(chart.around, high - low, np.inf)
     saddles = () if chart.region else [q for q in points if is_saddle(chart, q)]
-    return Truth(np.array(minima), energies, heights, turns, within, inside, saddles)
+    return Truth(np.array(minima), energies, heights, turns, within, inside, saddles, chart)
 
 
 def floods(grid: Grid, minima: Sequence[Array], **how: bool) -> tuple[Flood, Flood]:

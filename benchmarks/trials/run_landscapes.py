@@ -54,6 +54,7 @@ def trial(posed: Posed, capped: bool = False) -> Iterator[Facts]:
         "outcome": outcome, "wrong": wrong, "minima": len(found.minima),
         "passes": len(found.passes), "known": len(posed.truth.energies), "close": close,
         "pairs": pairs, "loops": len(found.loops), "notes": found.notes,
+        "euler": found.euler is not None and posed.truth.euler(found.cap) is not None,
     }  # fmt: skip
 
 

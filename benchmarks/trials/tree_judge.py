@@ -63,6 +63,10 @@ def complaints(posed: Posed, found: Any) -> Iterator[str]:
     known = [k for k in names if k is not None]
     yield from _about_barriers(truth, known, found)
     yield from _about_passes(truth, known, found)
+    if found.complete and found.euler is not None and posed.kind != "loci":
+        known_one = truth.euler(found.cap)
+        if known_one not in {None, found.euler}:
+            yield f"the Euler characteristic is {known_one}, not {found.euler}"
     if found.complete and found.cap == np.inf:
         yield from _about_merges(truth, known, found)
         yield from _about_saddles(posed, found)

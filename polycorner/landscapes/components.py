@@ -200,7 +200,7 @@ class _Search:
         images = low + step - slack, high + step + slack
         hull = np.minimum(low, images[0]), np.maximum(high, images[1])
         v_lo, v_hi, g_lo, g_hi = self.functions.gradients(*hull)
-        fixed = ~((v_lo <= 0) & (v_hi >= 0))
+        fixed = (v_lo > 0) | (v_hi < 0)  # not so for bounds that are no numbers
         rising = (_growth(g_lo, g_hi, step) > 0) & self.functions.continuous(*hull)
         shown = (step != 0).any(axis=1)
         shown &= (fixed | rising | ~self._mattering(v_lo, v_hi)).all(axis=1)

@@ -89,14 +89,17 @@ def landscape(
     >>> found = landscape(D, (x**2 - 1) ** 2 + y**2 + x / 10, box=[(-3, 3), (-3, 3)])
     >>> found.complete, len(found.minima), len(found.passes)
     (True, 2, 1)
-    >>> found.barrier(1, 0).rise
+    >>> [round(x, 9) for x in found.barrier(1, 0).rise]
+    [0.901883406, 0.901883406]
     """
     checks.real("cap", cap, above=-inf, infinite=True)
     posed = pose(polyhedron, energy)
     whole = domain(polyhedron.manifold, box)
     if symmetry is not None:
         checks.instance("symmetry", symmetry, Symmetry)
-    limited = polyhedron.intersected(region)
+    checks.real("resolution", resolution, above=0)
+    limits = Limits(max_boxes, max_seconds, workers, progress)
+    limited = _limited(polyhedron, region)
     exits = _exits(polyhedron, limited, region)
     walls, sides, notes = _walls(pose(limited, posed.energy), whole, symmetry, cap)
     bounded = limited.intersected(walls) if walls else limited
@@ -107,8 +110,7 @@ def landscape(
         )  # fmt: skip
         if flat is not None:
             return replace(flat, problem=posed, notes=(*notes, *flat.notes))
-    options: dict[str, Any] = {"box": sides, "resolution": resolution, "cap": cap}
-    options["limits"] = limits = Limits(max_boxes, max_seconds, workers, progress)
+    options: dict[str, Any] = {"box": sides, "resolution": resolution, "cap": cap, "limits": limits}
     with first_interrupt(limits.stop.set):
         found = critical_points(bounded, posed.energy, symmetry=symmetry, kept=exits, **options)
         ordered = Sorted(found, frozenset(exits), Curves(found.problem), cap)
@@ -128,6 +130,13 @@ def landscape(
         (*notes, *_sections(whole)),
         ordered.euler,
     )
+
+
+def _limited(polyhedron: Polyhedron, region: Any) -> Polyhedron:
+    try:
+        return polyhedron.intersected(region)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"region: {error}") from None
 
 
 def _exits(polyhedron: Polyhedron, limited: Polyhedron, region: Any) -> tuple[str, ...]:

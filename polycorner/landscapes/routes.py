@@ -22,7 +22,7 @@ class Route(Checked):
         at a vertex.
     verified : bool
         Whether it is proved that a path near the polyline lies in the set and below ``top``: the
-        polyline itself, but for its ends, which are points that are enclosed only.
+        polyline itself in the midst, curves along walls at passes and minima, and along equations.
     """
 
     vertices: Array

@@ -18,7 +18,7 @@ import numpy as np
 from polycorner import checks
 from polycorner.landscapes.barriers import Kind, Landscape, Minimum, Pass, Side
 from polycorner.landscapes.routes import Route
-from polycorner.landscapes.walks import Mask, Numbers, Orbits, Walks
+from polycorner.landscapes.walks import STRIDE, Mask, Numbers, Orbits, Walks
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.copositivity import simplex_minimisers
 from polycorner.minimisation.findings import OPEN, Local
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
 
 PART = 100  # walks that are done together, at most
-SECOND = 8  # every so many walks ends at a point of index 2, where weak contacts may make a pass
+SIZES = (1.0, 1.0, 0.2, 0.05)  # of surroundings of a minimum that are walked in
+SECOND = 7  # every so many walks ends at a point of index 2, where weak contacts may make a pass
 MOST_VERTICES = 5000  # of multipliers that are not unique, which are tried
 NEAREST = 4  # points from which a pair of branches is tried, at least
 
@@ -377,7 +378,9 @@ def search_passes(  # noqa: PLR0913 - all but two are options
         done = 0
         for part in _parts(problem, [c.point for c in minima], points, starts, rng):
             closed = part.closed & part.allowed
-            ends, _, found = walks.climb(part.q, part.allowed, closed, part.way, part.rising)
+            ends, _, found = walks.climb(
+                part.q, part.allowed, closed, part.way, part.rising, part.longest
+            )
             for q in ends[found]:
                 record(q)
             done += len(ends)
@@ -409,6 +412,7 @@ class Part:
     closed: Mask
     way: Array
     rising: Numbers
+    longest: Array
 
 
 def _parts(
@@ -421,18 +425,22 @@ def _parts(
     """Yield walks from given points, and others near minima and between two of them in turn."""
     scales, manifold = problem.scales, problem.polyhedron.manifold
     count = starts + len(points) if len(lows) else len(points)
-    size = _together(problem)
-    for first in range(0, count, size):
-        q, allowed, closed = [], [], []
-        for k in range(first, min(first + size, count)):
+    together = _together(problem)
+    for first in range(0, count, together):
+        q, allowed, closed, longest = [], [], [], list[float]()
+        for k in range(first, min(first + together, count)):
             held = np.zeros(problem.inequalities, dtype=np.bool_)
+            longest.append(STRIDE)
             if k < len(points):
                 q.append(points[k])
                 allowed.append(_some_branch(problem, points[k], rng))
             else:
                 a, b = (lows[i] for i in rng.integers(len(lows), size=2))
+                # Around a shallow minimum all is small.
+                size = rng.choice(SIZES) if k % 2 == 0 else 1.0
+                longest[-1] *= size
                 part = rng.uniform() if k % 2 else 0.0
-                aside = rng.normal(size=len(scales)) * rng.uniform() / np.sqrt(len(scales))
+                aside = rng.normal(size=len(scales)) * rng.uniform() * size / np.sqrt(len(scales))
                 between = manifold.difference(b, a)
                 q.append(manifold.moved(a, part * between + aside * scales))
                 allowed.append(_some_branch(problem, q[-1] if k % 2 else a, rng))
@@ -447,6 +455,7 @@ def _parts(
             np.array(closed).reshape(len(places), problem.inequalities),
             rng.normal(size=places.shape),
             np.where(np.arange(first, first + len(places)) % SECOND, 1, min(2, len(scales))),
+            np.array(longest),
         )
 
 

@@ -23,9 +23,10 @@ Mask = NDArray[np.bool_]
 Numbers = NDArray[np.intp]
 Aim = TypeVar("Aim", bound=tuple[NDArray[Any], ...])  # steps, and what belongs to them
 Orbits = Callable[[Array], Array]  # of points (B, n): scaled tangent vectors (B, g, n)
-STRIDE = 0.2  # longest step of a walk uphill, in scale units
+STRIDE = 0.2  # longest step of a walk uphill at most, in scale units
 FALL = 0.1  # the same downhill, where a longer one may miss a basin
-PUSH = 0.1  # length of a step where no curvature is negative
+PUSH = 0.5  # length of a step where no curvature is negative, over the longest
+LOST = 0.1  # part of a way that lies along the face, below which another one is taken
 CLIMBS = 120  # steps of a walk uphill, at most
 FALLS = 400
 PLACED = 3  # corrections of a step downhill
@@ -133,7 +134,13 @@ class Walks:
         )
 
     def climb(
-        self, q: Array, allowed: Mask, closed: Mask, way: Array, rising: Numbers
+        self,
+        q: Array,
+        allowed: Mask,
+        closed: Mask,
+        way: Array,
+        rising: Numbers,
+        longest: Array,
     ) -> tuple[Array, Mask, Mask]:
         """Walk to stationary points with negative curvatures along the face.
 
@@ -148,6 +155,8 @@ class Walks:
             Where to go while the curvatures are positive, in scaled coordinates.
         rising : (B,) array of int
             How many curvatures are to be negative at the end.
+        longest : (B,) array
+            The longest step of each walk: barriers that are narrower are missed.
 
         Returns
         -------
@@ -161,9 +170,14 @@ class Walks:
             closed[going] |= self._missed(q[going], allowed[going])
             some, model = self.model(q[going], closed[going])
             going = going[some]
-            aims = _uphill(model, way[going], rising[going])
+            aims = _uphill(model, way[going], rising[going], longest[going])
             step, new, up = self._freed(
-                model, q[going], closed, going, aims, lambda m, k: _uphill(m, way[k], rising[k])
+                model,
+                q[going],
+                closed,
+                going,
+                aims,
+                lambda m, k: _uphill(m, way[k], rising[k], longest[k]),
             )
             part, met = _reach(model, step, allowed[going] & ~closed[going])
             closed[going] |= met
@@ -300,7 +314,7 @@ def _first(closed: Mask, rows: int) -> Numbers:
     return np.hstack([first, np.broadcast_to(np.arange(m, rows), (len(closed), rows - m))])
 
 
-def _uphill(model: Model, way: Array, rising: Numbers) -> tuple[Array, Array, Mask]:
+def _uphill(model: Model, way: Array, rising: Numbers, longest: Array) -> tuple[Array, Array, Mask]:
     """Return steps, the ways to go on along (NaN for none), and where curvatures are negative."""
     w, every = model.curvatures, np.arange(len(way))
     firm = abs(w) > model.flat[:, None]
@@ -312,14 +326,14 @@ def _uphill(model: Model, way: Array, rising: Numbers) -> tuple[Array, Array, Ma
     soft = model.ways[:, :, 0] * np.where(moves[:, 0] < 0, -1.0, 1.0)[:, None]
     pushed = np.einsum("bij,bj->bi", model.along, way)
     size = np.linalg.norm(pushed, axis=1)
-    lost = size < PUSH * np.linalg.norm(way, axis=1)
+    lost = size < LOST * np.linalg.norm(way, axis=1)
     pushed[lost] = np.einsum("bij,bj->bi", model.along[lost], soft[lost])
     size[lost] = np.linalg.norm(pushed[lost], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        pushed = np.where(size[:, None] > PUSH, pushed / size[:, None], np.nan)
+        pushed = np.where(size[:, None] > LOST, pushed / size[:, None], np.nan)
     across = step - np.einsum("bi,bi->b", step, pushed)[:, None] * pushed
-    step = np.where(up[:, None], step, _limited(across, STRIDE) + PUSH * pushed)
-    step = _limited(step, STRIDE) + _limited(model.back, STRIDE)
+    step = np.where(up[:, None], step, _limited(across, longest) + PUSH * longest[:, None] * pushed)
+    step = _limited(step, longest) + _limited(model.back, STRIDE)
     new = np.where(up[:, None], soft, pushed)
     return np.where(np.isfinite(step), step, 0.0), new, up
 

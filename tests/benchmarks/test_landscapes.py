@@ -73,6 +73,26 @@ class TestAnswersInThePlane:
         assert grid.above([(-1, 0), (1, 0)]).stray < 1e-3
         assert grid.above([(1, 0)]).stray == pytest.approx(1, abs=0.05)
 
+    @pytest.mark.parametrize(
+        ("parts", "cap", "number"),
+        [
+            ([], np.inf, 1),
+            ([], 0.5, 2),
+            ([[x**2 + y**2 - 0.25]], np.inf, 0),
+            ([[x - 0.5, -0.5 - x, y - 1]], np.inf, 1),
+            ([[(x - 1) ** 2 + y**2 - 0.25], [(x + 1) ** 2 + y**2 - 0.25]], np.inf, -1),
+        ],
+    )
+    def test_the_euler_characteristic_counts_parts_less_holes(self, parts, cap, number):
+        assert known_on(chart(WELLS + x / 1000, *parts)).euler(cap) == number
+
+    def test_the_euler_characteristic_of_a_torus_with_a_hole(self):
+        sides = ((0.0, 2 * np.pi),) * 2
+        energy, hole = sympy.cos(x) + sympy.cos(y), 1.5 - sympy.cos(x - 1) - sympy.cos(y)
+        torus = Chart((x, y), energy, (hole,), ("and", 0), sides, (True, True))
+        assert Grid(torus, 200).euler(np.inf) == -1
+        assert Grid(replace(torus, tree=("and",)), 200).euler(np.inf) == 0
+
     def test_stationary_points_are_those_of_the_polynomial(self):
         found = candidates(Chart((x, y), WELLS, (), ("and",), SIDES))
         assert sorted(np.round(q, 9).tolist() for q in found) == [[-1, 0], [0, 0], [1, 0]]

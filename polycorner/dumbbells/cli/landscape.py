@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from polycorner.dumbbells import RelativePlacements
     from polycorner.landscapes import Landscape
 
+HIGHEST = 1.1  # default of the cap, over the energy of the pass between the hands
+
 
 @click.command(
     cls=GroupedCommand, epilog=examples("landscape dyad --out out", "landscape dyad --rod 1 --json")
@@ -34,6 +36,7 @@ def dyad(limits: dict[str, Any], as_json: bool, out: Path | None, **options: flo
 
     Heights are those over two dumbbells on the lowest line, in mm times the weight of a ball, while
     the pair hangs as low as it can; in the plane, the limit of the radius times that, in mm².
+    Without --cap passes are sought a little beyond the one between the hands.
     """
     pair = chosen_pair(options)
     prepare(out)
@@ -44,8 +47,10 @@ def dyad(limits: dict[str, Any], as_json: bool, out: Path | None, **options: flo
             model = RelativePlacements(pair)
         except ValueError as error:
             fail(f"--rod: {str(error).removeprefix('pair: ')}")
-        if "cap" in limits:
-            limits["cap"] = _energy(model, limits["cap"])
+        # Above both ways to leave a dyad: by one contact at r^2, by two at 2 r^2.
+        limits["cap"] = (
+            _energy(model, limits["cap"]) if "cap" in limits else HIGHEST * 2 * pair.ball_radius**2
+        )
         limits |= {"box": model.box, "symmetry": model.symmetry, "progress": progress}
         found = searched(model.polyhedron, model.energy, **limits)
     unit, drawn = "mm²" if pair.is_plane else "mm", None
