@@ -136,7 +136,8 @@ def _limited(polyhedron: Polyhedron, region: Any) -> Polyhedron:
     try:
         return polyhedron.intersected(region)
     except (TypeError, ValueError) as error:
-        raise type(error)(f"region: {error}") from None
+        msg = f"region: {error}"
+        raise type(error)(msg) from None
 
 
 def _exits(polyhedron: Polyhedron, limited: Polyhedron, region: Any) -> tuple[str, ...]:

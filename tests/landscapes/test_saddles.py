@@ -12,7 +12,8 @@ from scipy.optimize import minimize
 
 from polycorner import AnyOf, Manifold, Polyhedron, Symmetry, certify
 from polycorner.landscapes import search_landscape
-from polycorner.landscapes.saddles import crossing_at, search_passes, sides_of
+from polycorner.landscapes.crossings import crossing_at, sides_of
+from polycorner.landscapes.saddles import search_passes
 from polycorner.minimisation.problem import pose
 from polycorner.models import LennardJones
 from polycorner.polyhedra import Element
