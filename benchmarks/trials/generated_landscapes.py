@@ -6,11 +6,16 @@ asked for, and a map from points of the problem to coordinates of the answer.
 
 import numpy as np
 
-from benchmarks.trials import curved_landscapes, planar_landscapes
+from benchmarks.trials import curved_landscapes, edge_landscapes, planar_landscapes
 from benchmarks.trials.known_trees import DegenerateError
 from benchmarks.trials.posed_landscapes import Posed
 
-DRAWS = (*planar_landscapes.DRAWS, *curved_landscapes.DRAWS, *planar_landscapes.REGIONS)
+DRAWS = (
+    *planar_landscapes.DRAWS,
+    *curved_landscapes.DRAWS,
+    *planar_landscapes.REGIONS,
+    *edge_landscapes.DRAWS,
+)
 TRIES = 100
 
 

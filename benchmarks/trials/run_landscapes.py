@@ -21,7 +21,7 @@ from benchmarks.trials.tree_judge import complaints, tightness
 from polycorner.landscapes import landscape
 
 SECONDS = 30.0
-ALL = 80 * len(DRAWS)
+ALL = 70 * len(DRAWS)
 SEED = 11
 MOST = 100_000
 CAPPED = 7  # one in so many is asked up to an energy only,

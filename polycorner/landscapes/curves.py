@@ -287,18 +287,22 @@ class Curves:
 
     # ----------------------------------------------------------------------------- straight pieces
 
-    def straight(self, a: Array, b: Array, ceiling: "Ball", halvings: int = MOST_HALVINGS) -> bool:
-        """Whether a path near a straight piece lies in the set and below a ceiling."""
+    def straight(
+        self, a: Array, b: Array, ceiling: "Ball", halvings: int = MOST_HALVINGS
+    ) -> list[Array] | None:
+        """Return points from ``a`` to ``b``, the first left out, if a path near them is verified.
+
+        It lies in the set and below a ceiling.
+        """
         with precision(BITS):
             if self._piece(a, b, ceiling):
-                return True
+                return [b]
         if not halvings:
-            return False
-        middle = 0.5 * (a + b)
-        if self.equations:
-            middle = self.restored(middle)
-        parts = (a, middle), (middle, b)
-        return all(self.straight(*part, ceiling, halvings - 1) for part in parts)
+            return None
+        middle = self.restored(0.5 * (a + b)) if self.equations else 0.5 * (a + b)
+        first = self.straight(a, middle, ceiling, halvings - 1)
+        second = first and self.straight(middle, b, ceiling, halvings - 1)
+        return [*first, *second] if first and second else None
 
     def restored(self, q: Array) -> Array:
         """Return a point on the equations near another one."""

@@ -240,7 +240,7 @@ class Descents:
                 if step < self.options.least:
                     return None
                 continue
-            nearer, length = moved
+            on, length = moved
             if length < 1e-3 * step:
                 # At rest beside a minimum, or on the way to a saddle: off it by chance.
                 stalled += 1
@@ -250,11 +250,10 @@ class Descents:
                 trial = q + step * kick / np.linalg.norm(kick) * self.scales
                 if self.curves.equations:
                     trial = self.curves.restored(trial)
-                if self.curves.straight(q, trial, ceiling, 2):
-                    nearer = trial
-            points.append(nearer)
+                on = self.curves.straight(q, trial, ceiling, 2) or on
+            points.extend(on)
             # Functions of images in a periodic arrangement are meant near the principal interval.
-            q = self.manifold.wrap(nearer)
+            q = self.manifold.wrap(on[-1])
             step = min(self.options.longest, 1.7 * step)
         return None
 
@@ -286,9 +285,10 @@ class Descents:
             target = targets[number]
             for lifted in target.lifted:
                 way = self._last(q, lifted.middle, target)
-                fits = lifted.top < below and self._likely(q, way[0], below)
-                if fits and self.curves.straight(q, way[0], ceiling, 3):
-                    return number, way
+                if lifted.top < below and self._likely(q, way[0], below):
+                    points = self.curves.straight(q, way[0], ceiling, 3)
+                    if points:
+                        return number, [*points, *way[1:]]
         return None
 
     def _last(self, q: Array, lifted: Array, target: Target) -> list[Array]:
@@ -312,8 +312,8 @@ class Descents:
 
     def _moved(
         self, q: Array, step: float, below: float, ceiling: "Ball"
-    ) -> tuple[Array, float] | None:
-        """Return a lower point, and how far it is in scale units; None if none is verified."""
+    ) -> tuple[list[Array], float] | None:
+        """Return points to a lower one, how far it is in scale units; None if none is verified."""
         values, slopes, bends = self.problem.evaluate(q, 2)
         if not all(np.isfinite(x).all() for x in (values, slopes, bends)):
             return None
@@ -330,18 +330,20 @@ class Descents:
         rows = list(self.curves.equations)
         jac, gaps = slopes[rows] * self.free, -values[rows]
         wanted = np.minimum(margin, step / 2) * np.linalg.norm(slopes[near], axis=1)
-        d = self._step(step, (g, a, wanted - f, jac, gaps), bends[-1], bends[near])
+        # Half of the margin is kept; where less is left, all of it is restored.
+        short = f < 0.5 * wanted
+        goal = np.where(short, wanted, 0.5 * wanted)
+        d = self._step(step, (g, a, goal - f, jac, gaps), bends[-1], bends[near])
         if d is None:
             return None
         d = d * self.free * min(1.0, step / max(float(np.linalg.norm(d)), 1e-300))
-        trial = self._corrected(q + d * self.scales, near, 0.5 * wanted)
+        trial = self._corrected(q + d * self.scales, near, 0.4 * wanted)
         # Where walls are too near for the margin the energy may rise a little.
-        more = 0.1 * (below - energy) if (f < 0.5 * wanted).any() else 0.0
+        more = 0.1 * (below - energy) if short.any() else 0.0
         if not self.problem.energy.value(trial) < energy + more:
             return None
-        if not self.curves.straight(q, trial, ceiling, 1):
-            return None
-        return trial, float(np.linalg.norm(d))
+        points = self.curves.straight(q, trial, ceiling, 1)
+        return None if points is None else (points, float(np.linalg.norm(d)))
 
     def _step(
         self, step: float, linear: tuple[Array, ...], bend: Array, bends: Array

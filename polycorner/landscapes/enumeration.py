@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner import checks
+from polycorner.formulas.periodicity import check_function
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.landscapes.barriers import Landscape
@@ -148,6 +149,8 @@ def _exits(polyhedron: Polyhedron, limited: Polyhedron, region: Any) -> tuple[st
     again = [part.name for part in several if id(part) in own]
     if again:
         checks.refuse("region", "inequalities that the polyhedron does not have", again[0])
+    for function in limited.functions[len(polyhedron.functions) :]:
+        check_function(function, periodic=True)
     names = limited.names[len(polyhedron.functions) :]
     always, _ = limited.unions
     inside = frozenset(limited.names[i] for i in always)

@@ -39,7 +39,6 @@ all the same.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,6 +52,7 @@ from polycorner.landscapes.barriers import OUTSIDE, Bounds, Kind, Minimum, Pass,
 from polycorner.landscapes.components import components
 from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.descents import Descents, Target, unwound
+from polycorner.landscapes.pieces import nerve, parted
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import StationaryList, StationaryPoint
 from polycorner.proofs.kkt import KKTSystem, enclose, newton
@@ -473,30 +473,6 @@ class Sorted:
                     one.orbit,
                 )  # fmt: skip
         return None
-
-
-def parted(active: frozenset[int], pieces: Sequence[Piece]) -> list[Piece]:
-    """Return a piece of each class of those that lower points join; see the module."""
-    root = list(range(len(pieces)))
-
-    def find(a: int) -> int:
-        while root[a] != a:
-            a = root[a]
-        return a
-
-    for a, b in combinations(range(len(pieces)), 2):
-        if pieces[a] | pieces[b] != active:
-            root[find(b)] = find(a)
-    return [piece for k, piece in enumerate(pieces) if root[k] == k]
-
-
-def nerve(active: frozenset[int], pieces: Sequence[Piece]) -> int:
-    """Return the Euler characteristic of the nerve of lower points in pieces; see the module."""
-    chi = 0
-    for size in range(1, len(pieces) + 1):
-        some = (frozenset[int]().union(*chosen) for chosen in combinations(pieces, size))
-        chi -= (-1) ** size * sum(union != active for union in some)
-    return chi
 
 
 def bounds_of(curves: Curves, spot: Spot) -> Bounds:

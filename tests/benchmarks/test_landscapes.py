@@ -158,7 +158,7 @@ class TestGenerated:
     def test_two_resolutions_never_disagree(self, number):
         posed = problem(0, number)
         given = getattr(posed.answer, "args", [None])[0]
-        if not isinstance(given, Chart):
+        if not isinstance(given, Chart) or len(posed.answer.args) > 1:
             pytest.skip("its answer does not come from a grid")
         truth = known_on(given)
         for n in (120, 260):

@@ -153,6 +153,33 @@ def test_equations() -> None:
         assert len(found.loops) == count - 1
 
 
+def test_a_sphere() -> None:
+    """A quadratic form on the unit sphere, and a nearly linear energy where a quarter is cut out.
+
+    Of ``x^2 + 2 y^2 + 3 z^2`` the minima are 1, at ``+-e_x``, the saddles 2, at ``+-e_y``: one
+    joins, the other is a loop.  Where ``x < 0`` and ``y < 0`` are cut out together the two walls
+    end in tips at the poles.
+    """
+    x, y, z = SPACE.symbols
+    sphere = [x**2 + y**2 + z**2 - 1]
+    found = landscape(
+        Polyhedron(SPACE, [], equations=sphere), x**2 + 2 * y**2 + 3 * z**2, box=[(-2, 2)] * 3
+    )
+    assert found.complete
+    assert len(found.minima) == 2
+    assert len(found.passes) == 2
+    assert len(found.loops) == 1
+    assert encloses(found.barrier(0, 1), 2.0)
+    cut = Polyhedron(SPACE, [AnyOf(x, y)], equations=sphere)
+    found = landscape(cut, x + y + z / 10, box=[(-2, 2)] * 3)
+    assert found.complete
+    assert len(found.minima) == 2
+    assert [p.kind for p in found.passes] == ["tip", "tip"]
+    assert len(found.loops) == 1
+    assert encloses(found.barrier(0, 1), -0.1)
+    assert is_a_way(found, found.barrier(0, 1))
+
+
 def test_sides_of_a_box_are_walls() -> None:
     """On an arc of a circle minima at its ends are held by the sides of the box."""
     manifold = Manifold(("a", "h"), (2 * np.pi, inf))
@@ -331,6 +358,18 @@ def test_regions_are_intersections() -> None:
         landscape(DISC, X**2 + Y**2, box=SQUARE, region=[18 - 2 * X**2 - 2 * Y**2])
 
 
+def test_regions_on_circles_are_periodic() -> None:
+    """``1 - a`` jumps at the seam of a circle, where the region would be left unseen."""
+    manifold = Manifold(("a", "h"), (2 * np.pi, inf))
+    a, h = manifold.symbols
+    strip, energy = Polyhedron(manifold, [1 - h**2]), sympy.sin(a) + h**2
+    with pytest.raises(ValueError, match="expected a function with the period"):
+        landscape(strip, energy, box=[None, (-2, 2)], region=[1 - a])
+    # The half circle ends at -1 - pi/2 and pi/2 - 1, where the energy is -cos 1 and cos 1.
+    half_circle = landscape(strip, energy, box=[None, (-2, 2)], region=[sympy.cos(a + 1)])
+    assert encloses(half_circle.escape(0), -np.cos(1.0))
+
+
 # ----------------------------------------------------------------------------- what is not decided
 
 
@@ -474,3 +513,38 @@ def test_flood_fill(seed: int) -> None:
             assert barrier.lower <= grid + room
             deep = grid - max(found.minima[k].energy[1] for k in (a, b)) > room
             assert not deep or grid == inf or grid - room <= barrier.upper
+
+
+@pytest.mark.parametrize("seed", [2, 4, 13])
+def test_flat_landscapes_in_two_ways(seed: int) -> None:
+    """By linear programmes, and by the list of critical points: passes that merge are the same.
+
+    Declaring a symmetry, though without elements, takes the second way.
+    """
+    rng = np.random.default_rng(seed)
+
+    def exact(value: float) -> sympy.Rational:
+        return sympy.Rational(round(1000 * float(value)), 1000)
+
+    parts = []
+    for _ in range(4):
+        x, y, turn = *rng.uniform(-1, 1, 2), rng.uniform(0, 7)
+        u, v = X - exact(x), Y - exact(y)
+        turns = [(exact(np.cos(turn + k)), exact(np.sin(turn + k))) for k in (0, 1.9, 4.3)]
+        parts.append(AnyOf(*[c * u + s * v - exact(rng.uniform(0.2, 0.4)) for c, s in turns]))
+    d, energy = Polyhedron(M, parts), exact(rng.uniform(0.3, 1)) * X + Y
+    flat = landscape(d, energy, box=[(-2, 2)] * 2)
+    listed = landscape(d, energy, box=[(-2, 2)] * 2, symmetry=Symmetry())
+    assert flat.complete
+    assert listed.complete
+    assert len(flat.minima) == len(listed.minima) > 1
+    order = [
+        min(range(len(listed.minima)), key=lambda k: abs(listed.minima[k].point - m.point).max())
+        for m in flat.minima
+    ]
+    assert sorted(order) == list(range(len(order)))
+    for a in range(len(order)):
+        for b in range(a):
+            one, other = flat.barrier(a, b), listed.barrier(order[a], order[b])
+            assert one.lower <= other.upper
+            assert other.lower <= one.upper

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron
-from polycorner.landscapes.passes import parted
+from polycorner.landscapes.pieces import parted
 from polycorner.spaces.manifold import Array
 
 CELLS = 14  # along an axis: even, so that none lies at 0
