@@ -231,8 +231,11 @@ class Grid:
         room = self.room()
         outer = self.chart.inside((value + room)[1:]) & (value[0] - room[0] <= cap)
         inner = self.chart.inside((value - room)[1:]) & (value[0] + room[0] <= cap)
-        found = {_euler(np.pad(cells, [(0, 1 - c) for c in self.chart.around]))
-                 for cells in (outer, inner)}  # fmt: skip
+        around = self.chart.around
+        found = {
+            _euler(np.pad(cells, [(0, 1 - c) for c in around]), wide)
+            for cells, wide in ((outer, True), (inner, False))
+        }
         return found.pop() if len(found) == 1 and not self.chart.poles else None
 
     def _node(self, q: Array) -> int:
@@ -307,11 +310,15 @@ class Grid:
         return Flood(joined(count, found), stray)
 
 
-def _euler(cells: Array) -> int:
-    """Return vertices less edges plus cells of a union of closed cells, around both ends."""
-    along = cells | np.roll(cells, 1, axis=0), cells | np.roll(cells, 1, axis=1)
-    vertices = along[0] | np.roll(along[0], 1, axis=1)
-    return int(vertices.sum()) - int(along[0].sum() + along[1].sum()) + int(cells.sum())
+def _euler(cells: Array, wide: bool) -> int:
+    """Return vertices less edges plus cells of a union of cells, around both ends.
+
+    Of closed cells if it is wide, joined by corners, too; else of what is inside their union.
+    """
+    both = np.logical_or if wide else np.logical_and
+    along = [both(cells, np.roll(cells, 1, axis=axis)) for axis in (0, 1)]
+    vertices = both(along[0], np.roll(along[0], 1, axis=1))
+    return int(vertices.sum()) - sum(int(edges.sum()) for edges in along) + int(cells.sum())
 
 
 def joined(count: int, links: Any) -> Array:

@@ -384,7 +384,10 @@ def known_product(axes: Sequence[Truth]) -> Truth:
         for k, axis in enumerate(axes):
             for i in range(place[k] + 1, len(axis.energies)):
                 other = (*place[:k], i, *place[k + 1 :])
-                (top,) = axis.height(place[k], i)
+                top, *others = axis.height(place[k], i)
+                if others:
+                    msg = "an axis whose heights are not known"
+                    raise DegenerateError(msg)
                 height = top + energies[number[place]] - float(axis.energies[place[k]])
                 links.append((height, number[place], number[other]))
     merged = joined(len(places), ((a, b, w) for w, a, b in sorted(links) if w < np.inf))

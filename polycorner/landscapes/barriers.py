@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from polycorner import checks
-from polycorner.landscapes.graph import Forest, Link
+from polycorner.landscapes.graph import Forest, Tie
 from polycorner.landscapes.routes import Route
 from polycorner.minimisation.problem import Problem
 from polycorner.printing import Printed, Sheet, Table, facts, number, units
@@ -223,7 +223,7 @@ class Landscape(Checked, Printed):
             tops = [s.route.top for s in sides if s.route] if p.kind != "exit" else []
             weight = p.energy[0] if lower else max([p.energy[1], *tops])
             ends = tuple(nodes[s.minimum] for s in sides if s.minimum in nodes)
-            links.append(Link(every if lower and not known else ends, weight, k))
+            links.append(Tie(every if lower and not known else ends, weight, k))
         return Forest(len(every), links)
 
     @cached_property
@@ -236,8 +236,9 @@ class Landscape(Checked, Printed):
         return {leaving: self._forest(lower=False, leaving=leaving) for leaving in (False, True)}
 
     def _is_known(self, p: Pass) -> bool:
-        """Whether it is proved what a pass joins."""
-        return bool(p.sides) and all(side.verified for side in p.sides)
+        """Whether it is proved what a pass joins; without proof, whether it was found."""
+        known = (s.verified if self.proved else s.minimum is not None for s in p.sides)
+        return bool(p.sides) and all(known)
 
     def barrier(self, start: int, end: int) -> Barrier:
         """Return the least energy at which two minima are in one component, between two bounds.
@@ -271,9 +272,7 @@ class Landscape(Checked, Printed):
         route = self._route(way, self._nodes(leaving))
         return Barrier(start, end, lower, upper, rise, used, self.proved, route)
 
-    def _route(
-        self, way: Sequence[tuple[int, int, Link]], nodes: Mapping[int, int]
-    ) -> Route | None:
+    def _route(self, way: Sequence[tuple[int, int, Tie]], nodes: Mapping[int, int]) -> Route | None:
         """Return the ways down to both sides of the passes on a way, joined."""
         parts: list[tuple[Route, bool]] = []
         for a, b, link in way:

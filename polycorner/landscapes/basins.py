@@ -173,8 +173,8 @@ def basins(  # noqa: PLR0913 - all but two are options
         Symmetry of the polyhedron *and of the energy* up to which minima are identified.  Of minima
         of a landscape that are, the first one counts for all.
     executor : optional
-        Where descents are computed, as for :func:`~polycorner.sweep`; the result does not depend on
-        it.  Default this process.
+        Where descents are computed, as for :func:`~polycorner.sweeps.sweep`; the result does not
+        depend on it.  Default this process.
     progress : callable, optional
         Called after every descent; see :class:`~polycorner.progress.Progress`.
     tolerance, rank_tolerance : float, optional

@@ -130,12 +130,12 @@ def components(
         return Components((), open=True)
     along = np.array([i for i in domain.free if i not in z], dtype=int)
     periods = np.array(problem.polyhedron.manifold.periods)
-    search = _Search(problem, along, periods, lower, upper)
+    search = _ComponentSearch(problem, along, periods, lower, upper)
     search.run(lower[None].copy(), upper[None].copy())
     return search.found()
 
 
-class _Search:
+class _ComponentSearch:
     """Boxes that are sure, with those that are led to them, and those that are left."""
 
     def __init__(

@@ -31,7 +31,7 @@ from polycorner.formulas.ranges import outward
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.enclosures import Formulas
 from polycorner.landscapes.barriers import Landscape, Minimum, Pass, Side
-from polycorner.landscapes.programmes import Dictionary, Point, Programmes
+from polycorner.landscapes.programmes import Dictionary, ExactProgrammes, Point
 from polycorner.landscapes.routes import Route
 from polycorner.minimisation.problem import Problem
 from polycorner.printing import number
@@ -45,7 +45,7 @@ Choice = tuple[int, ...]  # the part of each union that a piece takes
 Link = tuple[Fraction, Choice, Choice]
 
 
-class Pieces:
+class ConvexPieces:
     """The pieces of a polyhedron of affine functions in a box, and an energy that is affine.
 
     Parameters
@@ -60,7 +60,7 @@ class Pieces:
         self.polyhedron = problem.polyhedron
         m = problem.inequalities
         equations = rows[m:-1]
-        self.programmes = Programmes(np.vstack([rows[:-1], -equations]), rows[-1], box)
+        self.programmes = ExactProgrammes(np.vstack([rows[:-1], -equations]), rows[-1], box)
         self._held = range(m, m + 2 * len(equations))
         always, self.unions = self.polyhedron.unions
         self._always = sorted(always)
@@ -140,7 +140,7 @@ class _Join:
     ways: list[list[Choice]]
 
 
-class Tree:
+class ConvexTree:
     """The tree in which components of ``{E <= c}`` are born and merge as ``c`` rises.
 
     Attributes
@@ -152,7 +152,7 @@ class Tree:
     """
 
     def __init__(
-        self, pieces: Pieces, heights: Mapping[Choice, Fraction], links: Iterable[Link]
+        self, pieces: ConvexPieces, heights: Mapping[Choice, Fraction], links: Iterable[Link]
     ) -> None:
         self.minima: list[list[Choice]] = []
         self.joins: list[_Join] = []
@@ -327,7 +327,7 @@ def convex_landscape(
     if rows is None:
         return None
     sides = [[*map(Fraction, side)] for side in zip(whole.lower, whole.upper, strict=True)]
-    pieces = Pieces(problem, rows, np.array(sides, dtype=object))
+    pieces = ConvexPieces(problem, rows, np.array(sides, dtype=object))
     stop, deadline = threading.Event(), monotonic() + max_seconds
 
     def going(taken: int) -> bool:
@@ -341,7 +341,7 @@ def convex_landscape(
         links = [link for link in links if link[0] < left]
         cap = outward(left)[0]
         notes = (f"The search ended early; nothing is known above the energy {number(cap)}.",)
-    tree = Tree(pieces, heights, links)
+    tree = ConvexTree(pieces, heights, links)
     numbers = {some[0]: k for k, some in enumerate(tree.minima)}
     return Landscape(
         problem,
@@ -367,7 +367,7 @@ def _affine(problem: Problem) -> Array | None:
     return np.array(rows, dtype=object)
 
 
-def _minimum(pieces: Pieces, orbit: int, some: list[Choice]) -> Minimum:
+def _minimum(pieces: ConvexPieces, orbit: int, some: list[Choice]) -> Minimum:
     found = [one for choice in some if (one := pieces.least(choice)) is not None]
     point = pieces.programmes.point(found[0])
     # Connected sets of one point each are one point.
@@ -381,7 +381,7 @@ def _minimum(pieces: Pieces, orbit: int, some: list[Choice]) -> Minimum:
     )
 
 
-def _pass(pieces: Pieces, orbit: int, join: _Join, numbers: Mapping[Choice, int]) -> Pass:
+def _pass(pieces: ConvexPieces, orbit: int, join: _Join, numbers: Mapping[Choice, int]) -> Pass:
     sides = [Side(numbers[way[-1]], _route(pieces, join.point, way)) for way in join.ways]
     return Pass(
         _rounded(join.point),
@@ -394,7 +394,7 @@ def _pass(pieces: Pieces, orbit: int, join: _Join, numbers: Mapping[Choice, int]
     )
 
 
-def _route(pieces: Pieces, start: Point, way: list[Choice]) -> Route:
+def _route(pieces: ConvexPieces, start: Point, way: list[Choice]) -> Route:
     """Return the way down from a point through pieces to the minimum on the last one.
 
     Each step is within one convex piece, and its ends are at most as high as the start.

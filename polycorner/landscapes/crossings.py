@@ -50,7 +50,7 @@ class Way:
 
 
 @dataclass(frozen=True, eq=False)
-class Crossing:
+class Junction:
     """Where components of a sublevel set join at a point.
 
     Attributes
@@ -86,7 +86,7 @@ def orbits_of(problem: Problem, symmetry: Symmetry | None) -> Orbits:
 
 def crossing_at(
     problem: Problem, q: Array, tolerances: Tolerances, free: int = 0
-) -> Crossing | None:
+) -> Junction | None:
     """Return how components join at a stationary point; None where they do not, or it is not seen.
 
     Not seen are points with dependent gradients of contacts and, in unions, with multipliers that
@@ -115,13 +115,13 @@ def crossing_at(
     if len(pieces) > 1:
         duals = np.asarray(np.linalg.pinv(rows.units), dtype=np.float64)
         found = _tip(pieces, active, shares[0], duals) if index == 0 else ()
-        return Crossing(found, index, "tip")
+        return Junction(found, index, "tip")
     closed = frozenset(active)
     both = tuple(Way(side * ways[:, 0], closed) for side in (1.0, -1.0)) if index == 1 else ()
     kind: Kind = "locus" if (abs(curvatures) <= small).sum() > free else "saddle"
     weak = np.flatnonzero(shares[0, : len(active)] <= local.small)
     if not len(weak):
-        return Crossing(both, index, kind)
+        return Junction(both, index, kind)
     firm, opened = abs(curvatures) > small, np.linalg.pinv(rows.units)[:, weak]
     stiff = ways[:, firm]
     relaxed = opened - stiff @ ((stiff.T @ forms[0] @ opened) / curvatures[firm][:, None])
@@ -129,12 +129,12 @@ def crossing_at(
     more = index + int((np.linalg.eigvalsh(form) < -small).sum())
     if index:
         copositive = simplex_minimisers(form)[1].min() >= -small
-        return Crossing(both if copositive else (), more, kind)
+        return Junction(both if copositive else (), more, kind)
     found = tuple(
         Way(relaxed @ u, closed - {active[weak[i]] for i in np.flatnonzero(u)})
         for u in _components(form, small)
     )
-    return Crossing(found, more, kind)
+    return Junction(found, more, kind)
 
 
 def _multipliers(rows: Rows, k: int, local: Local) -> Array:
@@ -172,7 +172,7 @@ def _redundant(
     bends: Array,
     slope: Array,
     zero: tuple[float, float],
-) -> Crossing | None:
+) -> Junction | None:
     """Return how components join where multipliers are not unique, mixtures of given ones.
 
     Below the point are the directions in which each of the forms is negative.  Where a mixture of
@@ -186,13 +186,13 @@ def _redundant(
         curvatures, ways = np.linalg.eigh(form)
         index = int((curvatures < -zero[1]).sum())
         if index == 0:
-            return Crossing((), 0, "saddle")
+            return Junction((), 0, "saddle")
         rates = np.einsum("i,cij,j->c", ways[:, 0], inner, ways[:, 0])
         if index == 1 and (rates < -zero[1]).all():
             way = rows.null_space @ ways[:, 0]
             bend = _bend(rows, k, slope, np.einsum("kij,i,j->k", bends, way, way))
             both = tuple(Way(side * way, frozenset(), bend) for side in (1.0, -1.0))
-            return Crossing(both, 1, "saddle")
+            return Junction(both, 1, "saddle")
     return None
 
 
@@ -274,7 +274,7 @@ def sides_of(problem: Problem, certificate: Certificate) -> tuple[Array, ...]:
 Start = tuple[Array, Mask, Mask]  # a point, the functions of its branch, contacts that are closed
 
 
-def starts_of(walks: Walks, q: Array, crossing: Crossing) -> list[Start]:
+def starts_of(walks: Walks, q: Array, crossing: Junction) -> list[Start]:
     """Return points below a pass with their branches; none unless they are at least two."""
     found = [_start(walks, q, way) for way in crossing.ways]
     starts = [start for start in found if start is not None]

@@ -14,7 +14,7 @@ from math import inf
 
 
 @dataclass(frozen=True)
-class Link:
+class Tie:
     """A link between nodes, which joins all of them.
 
     Attributes
@@ -34,7 +34,7 @@ class Link:
 class Joined:
     """Where a link joins two classes of nodes: their least members, the smaller number first."""
 
-    link: Link
+    link: Tie
     first: int
     second: int
 
@@ -42,10 +42,10 @@ class Joined:
 class Forest:
     """The minimal spanning forest of a graph, links of equal weight in the given order."""
 
-    def __init__(self, count: int, links: Iterable[Link]) -> None:
+    def __init__(self, count: int, links: Iterable[Tie]) -> None:
         self.root = list(range(count))
         self.joins: list[Joined] = []
-        self._next: list[list[tuple[int, Link]]] = [[] for _ in range(count)]
+        self._next: list[list[tuple[int, Tie]]] = [[] for _ in range(count)]
         for link in sorted(links, key=lambda one: one.weight):
             for a, b in zip(link.nodes, link.nodes[1:], strict=False):
                 first, second = sorted((self.find(a), self.find(b)))
@@ -61,9 +61,9 @@ class Forest:
             self.root[a] = a = self.root[self.root[a]]
         return a
 
-    def path(self, a: int, b: int) -> Sequence[tuple[int, int, Link]] | None:
+    def path(self, a: int, b: int) -> Sequence[tuple[int, int, Tie]] | None:
         """Return the links ``(from, to, link)`` on the way between two nodes; None if none."""
-        before: dict[int, tuple[int, Link] | None] = {a: None}
+        before: dict[int, tuple[int, Tie] | None] = {a: None}
         waiting = deque([a])
         while waiting and b not in before:
             here = waiting.popleft()
@@ -73,7 +73,7 @@ class Forest:
                     waiting.append(there)
         if b not in before:
             return None
-        steps: list[tuple[int, int, Link]] = []
+        steps: list[tuple[int, int, Tie]] = []
         while (last := before[b]) is not None:
             steps.append((last[0], b, last[1]))
             b = last[0]

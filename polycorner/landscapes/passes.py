@@ -56,7 +56,7 @@ from polycorner.landscapes.pieces import nerve, parted
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import StationaryList, StationaryPoint
 from polycorner.proofs.kkt import KKTSystem, enclose, newton
-from polycorner.proofs.lists.critical import CriticalList, CriticalPoint
+from polycorner.proofs.lists.critical import CriticalList, CriticalMember
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Candidate:
+class PossiblePass:
     """A pass before its sides are known.
 
     Attributes
@@ -92,7 +92,7 @@ class Candidate:
 
 
 @dataclass
-class Node:
+class ListedMinimum:
     """A minimum, or a component of a locus of minima, and where descents to it end."""
 
     minimum: Minimum
@@ -109,9 +109,9 @@ class Sorted:
         self.curves, self.cap = room, cap
         self.functions = BoxFunctions(found.problem.functions, found.problem.polyhedron.manifold)
         self.descents = Descents(room, found.domain.free)
-        self.nodes: list[Node] = []
+        self.nodes: list[ListedMinimum] = []
         self.outside: list[Target] = []  # minima at the walls of a region that may be left
-        self.candidates: list[Candidate] = []
+        self.candidates: list[PossiblePass] = []
         self.euler: int | None = 0
         for point in found.points:
             if self._asked(point.point.lower, point.point.upper):
@@ -166,7 +166,7 @@ class Sorted:
     def _asked(self, lower: Array, upper: Array) -> bool:
         return self.energy(self.spot(lower, upper, frozenset()))[0] <= self.cap
 
-    def _sort(self, one: CriticalPoint) -> None:
+    def _sort(self, one: CriticalMember) -> None:
         p, d = one.point, self.problem.polyhedron
         spot = self.sharp(p, one.zeros, p.active)
         held = frozenset(d.names.index(name) for name in p.active)
@@ -213,7 +213,7 @@ class Sorted:
             ]
 
     def _regular(
-        self, spot: Spot, one: CriticalPoint, held: frozenset[int], pieces: Sequence[Piece]
+        self, spot: Spot, one: CriticalMember, held: frozenset[int], pieces: Sequence[Piece]
     ) -> None:
         """Sort a point with independent gradients and positive multipliers."""
         p = one.point
@@ -224,7 +224,7 @@ class Sorted:
             if p.index == 1:
                 way = self._downwards(spot, held)
                 starts = [] if way is None else [(True, held, way), (True, held, -way)]
-                new = Candidate(*about, "saddle", p.orbit, self.energy(spot), starts)
+                new = PossiblePass(*about, "saddle", p.orbit, self.energy(spot), starts)
                 self.candidates.append(new)
         elif p.index == 0:
             classes = parted(held, pieces)
@@ -232,7 +232,7 @@ class Sorted:
                 ways = [(piece, self._into(spot, piece)) for piece in classes]
                 starts = [(False, piece, way) for piece, way in ways if way is not None]
                 starts = starts if len(starts) == len(classes) else []
-                new = Candidate(*about, "tip", p.orbit, self.energy(spot), starts)
+                new = PossiblePass(*about, "tip", p.orbit, self.energy(spot), starts)
                 self.candidates.append(new)
 
     def _minimum(self, spot: Spot, active: tuple[str, ...], orbit: int) -> None:
@@ -241,14 +241,14 @@ class Sorted:
             self.outside.append(target)
             return
         new = Minimum(spot.middle, self.energy(spot), active, "isolated", orbit)
-        self.nodes.append(Node(new, target))
+        self.nodes.append(ListedMinimum(new, target))
 
     def _undecided(
         self, lower: Array, upper: Array, active: tuple[str, ...] = (), orbit: int = -1
     ) -> None:
         spot = self.spot(lower, upper, frozenset())
         self.euler = None
-        new = Candidate(spot, active, None, "undecided", orbit, self.energy(spot))
+        new = PossiblePass(spot, active, None, "undecided", orbit, self.energy(spot))
         self.candidates.append(new)
 
     def _downwards(self, spot: Spot, held: frozenset[int]) -> Array | None:
@@ -319,14 +319,16 @@ class Sorted:
                 if place.index == 0:
                     new = Minimum(spot.middle, self.energy(spot), (), "locus", orbit)
                     target = self.descents.target(spot, part)
-                    self.nodes.append(Node(new, target))
+                    self.nodes.append(ListedMinimum(new, target))
                 else:
                     way = self._unstable(spot, z)
                     starts = [] if way is None else [
                         (True, frozenset[int](), way), (True, frozenset[int](), -way)
                     ]  # fmt: skip
                     energy = self.energy(spot)
-                    self.candidates.append(Candidate(spot, (), 1, "locus", orbit, energy, starts))
+                    self.candidates.append(
+                        PossiblePass(spot, (), 1, "locus", orbit, energy, starts)
+                    )
 
     def _unstable(self, spot: Spot, z: Sequence[int]) -> Array | None:
         bends = self.problem.evaluate(spot.middle, 2)[2][-1]
@@ -354,7 +356,7 @@ class Sorted:
                 ways = [(piece, self._into(spot, piece)) for piece in pieces]
                 starts = [(False, piece, way) for piece, way in ways if way is not None][:1]
             self.candidates.append(
-                Candidate(
+                PossiblePass(
                     spot, (*p.active, wall), p.index, "exit", -1, self.energy(spot), starts,
                     [Side(OUTSIDE)],
                 )
@@ -407,7 +409,7 @@ class Sorted:
 
     def _side(
         self,
-        one: Candidate,
+        one: PossiblePass,
         start: tuple[bool, frozenset[int], Array],
         targets: Sequence[Target],
     ) -> Side:
@@ -449,7 +451,7 @@ class Sorted:
     def _image(
         self,
         first: Pass,
-        one: Candidate,
+        one: PossiblePass,
         motions: "Sequence[tuple[Motion, list[int | None]]]",
     ) -> Pass | None:
         """Return a pass carried along by the symmetry that takes another one to it."""

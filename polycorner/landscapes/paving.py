@@ -112,8 +112,8 @@ def paved_barrier(
     problem : Problem
         ``D``, on lines and circles, and ``E``.
     box : sequence or mapping
-        Sides, as :func:`~polycorner.stationary_points` takes them.  Coordinates that are fixed
-        are so along all paths.
+        Sides, as :func:`~polycorner.proofs.stationary_points` takes them.  Coordinates that are
+        fixed are so along all paths.
     start : (n,) or (2, n) array
         A point of ``D``, which stands for all within ``Tolerances.same`` of it in each coordinate,
         in scale units; or the lower and the upper sides of a box.
@@ -171,7 +171,7 @@ def paved_barrier(
     places = [_place(d, found, "start", start)]
     places += [_place(d, found, "ends", end) for end in ends]
     heights = Heights(pose(limited, problem.energy), exits)
-    search = _Search(heights, found, places, walled, until, resolution)
+    search = _Refinement(heights, found, places, walled, until, resolution)
     ending = work_through(search.tasks(max_boxes), search.told, progress, seconds=max_seconds)
     search.find()
     return Paving(search.bound, search.treated, ending, search.way)
@@ -216,7 +216,7 @@ class _Cells:
         return 0.5 * self.lower + 0.5 * self.upper
 
 
-class _Search:
+class _Refinement:
     """Boxes and the bottleneck of the ways through them."""
 
     def __init__(

@@ -70,7 +70,7 @@ class Dictionary:
         return one
 
 
-class Programmes:
+class ExactProgrammes:
     """Linear programmes on a box, in exact numbers.
 
     Parameters
@@ -125,7 +125,7 @@ class Programmes:
             return True
         level = -self.energy
         level[0] += self.value(one)
-        some = Programmes(np.vstack([self.rows, level]), -self.all[free].sum(axis=0), self.box)
+        some = ExactProgrammes(np.vstack([self.rows, level]), -self.all[free].sum(axis=0), self.box)
         k = len(self.rows)
         found = some.start.holding([*(r for r in one.held if r < k), k])
         assert found is not None  # the point itself

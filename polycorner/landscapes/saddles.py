@@ -17,7 +17,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.landscapes.barriers import Landscape, Minimum, Pass, Side
-from polycorner.landscapes.crossings import Crossing, crossing_at, orbits_of, sides_of, starts_of
+from polycorner.landscapes.crossings import Junction, crossing_at, orbits_of, sides_of, starts_of
 from polycorner.landscapes.routes import Route
 from polycorner.landscapes.walks import STRIDE, Mask, Numbers, Walks
 from polycorner.minimisation.certificate import Certificate
@@ -123,7 +123,7 @@ def _together(problem: Problem) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Batch:
     """Walks that are done together; see :meth:`.Walks.climb`."""
 
     q: Array
@@ -140,7 +140,7 @@ def _parts(
     points: Sequence[Array],
     starts: int,
     rng: np.random.Generator,
-) -> Iterator[Part]:
+) -> Iterator[Batch]:
     """Yield walks from given points, and others near minima and between two of them in turn."""
     scales, manifold = problem.scales, problem.polyhedron.manifold
     count = starts + len(points) if len(lows) else len(points)
@@ -168,7 +168,7 @@ def _parts(
                 held = near[: problem.inequalities] & (rng.uniform(size=len(held)) < rng.uniform())
             closed.append(held)
         places = np.array(q)
-        yield Part(
+        yield Batch(
             places,
             np.array(allowed),
             np.array(closed).reshape(len(places), problem.inequalities),
@@ -218,7 +218,7 @@ def _tips(
 
 
 @dataclass(frozen=True, eq=False)
-class Node:
+class FoundMinimum:
     """A minimum of the landscape: an image of a locus under the finite group."""
 
     locus: Locus
@@ -278,7 +278,7 @@ class Lows:
 
     def _crossed(
         self, found: Certificate
-    ) -> tuple[Certificate, Crossing, list[tuple[Locus | None, Array]]]:
+    ) -> tuple[Certificate, Junction, list[tuple[Locus | None, Array]]]:
         """Return a pass with the ways down from it, which begin there."""
         quotient, problem = self.loci.quotient, self.walks.problem
         free = rank(quotient.orbit(found.point), quotient.tolerances.rank)
@@ -291,11 +291,11 @@ class Lows:
         ends = self.ends(q, allowed, closed)
         return found, crossing, [(end, np.vstack([found.point, path])) for end, path in ends]
 
-    def _images(self, orbit: int, locus: Locus) -> Iterator[Node]:
+    def _images(self, orbit: int, locus: Locus) -> Iterator[FoundMinimum]:
         """Yield the images of a minimum; a locus that is more than an orbit is listed once."""
         count = 1 if locus.wide else len(self.loci.quotient.symmetry.group)
         for _, point, place in self._distinct(locus.points[0], count):
-            yield Node(locus, orbit, point, place)
+            yield FoundMinimum(locus, orbit, point, place)
 
     def _distinct(self, q: Array, count: int) -> Iterator[tuple[int, Array, Array]]:
         """Yield the first images of a point that differ, with the numbers of the elements."""
@@ -310,9 +310,9 @@ class Lows:
         self,
         orbit: int,
         found: Certificate,
-        crossing: Crossing,
+        crossing: Junction,
         ends: list[tuple[Locus | None, Array]],
-        nodes: Sequence[Node],
+        nodes: Sequence[FoundMinimum],
     ) -> Iterator[Pass]:
         """Yield the images of a pass."""
         group = self.loci.quotient.symmetry.group
@@ -332,7 +332,7 @@ class Lows:
     def _names(active: Iterable[str], renaming: Mapping[str, str]) -> list[str]:
         return [renaming.get(name, name) for name in active]
 
-    def _side(self, end: Locus | None, path: Array, nodes: Sequence[Node]) -> Side:
+    def _side(self, end: Locus | None, path: Array, nodes: Sequence[FoundMinimum]) -> Side:
         """Return a side with its minimum, and its route if that leads to the minimum listed."""
         quotient, place = self.loci.quotient, self.loci.quotient.place(path[-1])
         apart = [
@@ -350,7 +350,7 @@ class Lows:
         return Side(k, Route(path, energies, float(energies.max()), verified=False))
 
 
-def _minimum(node: Node) -> Minimum:
+def _minimum(node: FoundMinimum) -> Minimum:
     found = node.locus.certificate
     kind: Literal["isolated", "locus"] = "locus" if node.locus.wide else "isolated"
     return Minimum(node.point, (found.energy, found.energy), found.active, kind, node.orbit)

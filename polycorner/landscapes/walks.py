@@ -34,7 +34,7 @@ ACROSS = 2.0  # what stands for curvatures across the face, over the norm of the
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class QuadraticModel:
     """Second-order models of the energy on faces at points, in scaled coordinates.
 
     Attributes
@@ -86,7 +86,7 @@ class Walks:
     orbits: Orbits
     tolerances: Tolerances
 
-    def model(self, q: Array, closed: Mask) -> tuple[Numbers, Model]:
+    def model(self, q: Array, closed: Mask) -> tuple[Numbers, QuadraticModel]:
         """Return models at points with some contacts closed, and at which points there is one."""
         problem, m = self.problem, self.problem.inequalities
         values, slopes, bends = problem.evaluate(q, 2)
@@ -118,7 +118,7 @@ class Walks:
         curvatures, ways = np.linalg.eigh(inner)
         multipliers = np.zeros((len(some), problem.rows))
         np.put_along_axis(multipliers, held, shares, axis=1)
-        return some, Model(
+        return some, QuadraticModel(
             values=values[:, :m],
             slopes=slopes[:, :m],
             energy=values[:, -1],
@@ -261,12 +261,12 @@ class Walks:
 
     def _freed(
         self,
-        model: Model,
+        model: QuadraticModel,
         q: Array,
         closed: Mask,
         going: Numbers,
         aims: Aim,
-        aim: Callable[[Model, Numbers], Aim],
+        aim: Callable[[QuadraticModel, Numbers], Aim],
     ) -> Aim:
         """Open a contact of each walk where its multiplier is negative and the step leads inward.
 
@@ -295,7 +295,7 @@ class Walks:
         with np.errstate(invalid="ignore"):
             return np.asarray(allowed & (values[:, :m] < -self.tolerances.zero * sizes))
 
-    def _opened(self, model: Model, closed: Mask) -> Numbers:
+    def _opened(self, model: QuadraticModel, closed: Mask) -> Numbers:
         """Return the contact of the most negative multiplier at each point, -1 where none is."""
         if not closed.shape[1]:
             return np.full(len(closed), -1)
@@ -314,7 +314,9 @@ def _first(closed: Mask, rows: int) -> Numbers:
     return np.hstack([first, np.broadcast_to(np.arange(m, rows), (len(closed), rows - m))])
 
 
-def _uphill(model: Model, way: Array, rising: Numbers, longest: Array) -> tuple[Array, Array, Mask]:
+def _uphill(
+    model: QuadraticModel, way: Array, rising: Numbers, longest: Array
+) -> tuple[Array, Array, Mask]:
     """Return steps, the ways to go on along (NaN for none), and where curvatures are negative."""
     w, every = model.curvatures, np.arange(len(way))
     firm = abs(w) > model.flat[:, None]
@@ -338,7 +340,7 @@ def _uphill(model: Model, way: Array, rising: Numbers, longest: Array) -> tuple[
     return np.where(np.isfinite(step), step, 0.0), new, up
 
 
-def _downhill(model: Model, longest: Array) -> tuple[Array, ...]:
+def _downhill(model: QuadraticModel, longest: Array) -> tuple[Array, ...]:
     """Return steps downhill; where nothing is curved, along the gradient."""
     curved = np.maximum(abs(model.curvatures), model.flat[:, None])
     step = np.einsum("bij,bj->bi", model.ways, -model.pulls / curved)
@@ -350,7 +352,7 @@ def _limited(step: Array, longest: float | Array) -> Array:
     return step * np.minimum(1.0, longest / np.maximum(size, 1e-300))[:, None]
 
 
-def _reach(model: Model, step: Array, open_: Mask) -> tuple[Array, Mask]:
+def _reach(model: QuadraticModel, step: Array, open_: Mask) -> tuple[Array, Mask]:
     """Return the part of each step up to the first wall, and the walls that are met there."""
     rates = np.einsum("bmn,bn->bm", model.slopes, step)
     hits = open_ & (model.values + rates < 0) & (rates < 0)

@@ -289,8 +289,8 @@ def minima(  # noqa: PLR0913 - all but two are options
     symmetry : Symmetry, optional
         Symmetry of the polyhedron *and of the energy* up to which minima are identified.
     executor : optional
-        Where descents are computed, as for :func:`~polycorner.sweep`; the result does not depend on
-        it.  Default this process.
+        Where descents are computed, as for :func:`~polycorner.sweeps.sweep`; the result does not
+        depend on it.  Default this process.
     progress : callable, optional
         Called after every start with the number of starts done, their total, and the number of
         minima in words; see :class:`~polycorner.progress.Progress`.

@@ -13,7 +13,7 @@ from polycorner.checks import about, real, refuse
 from polycorner.kinds import checked
 from polycorner.landscapes import Landscape, Minimum, Pass
 from polycorner.pictures.regions import MINIMA, SIDE
-from polycorner.pictures.trees import Bar, Tree, tree_of
+from polycorner.pictures.trees import Crossbar, DrawnTree, tree_of
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
@@ -123,7 +123,7 @@ class _TreeFigure:
     ) -> None:
         self.landscape, self.pictures, self.names = landscape, pictures, names
         self.pass_names, self.height = pass_names, height
-        self.tree: Tree = tree_of(landscape)
+        self.tree: DrawnTree = tree_of(landscape)
         self.loops = landscape.loops if loops else ()
         self.count = max(self.tree.places.values(), default=0.0) + 1
         self.pitch = min(max(MOST_WIDE / self.count, PITCH[0]), PITCH[1])
@@ -307,9 +307,9 @@ class _TreeFigure:
 
     # ------------------------------------------------------------------------------ list of passes
 
-    def _entries(self) -> list[Bar]:
+    def _entries(self) -> list[Crossbar]:
         """Return one bar for each orbit of passes, as many as there is room for, by height."""
-        first: dict[int, Bar] = {}
+        first: dict[int, Crossbar] = {}
         for bar in self.tree.bars:
             first.setdefault(self.landscape.passes[bar.merge.number].orbit, bar)
         chosen = sorted(first.values(), key=self._depth, reverse=True)
@@ -317,7 +317,7 @@ class _TreeFigure:
             chosen[: int(self.tall / self._row)], key=lambda bar: self._y(bar.merge.energy[1])
         )
 
-    def _depth(self, bar: Bar) -> float:
+    def _depth(self, bar: Crossbar) -> float:
         """Return the height of a bar over the lowest minimum that ends there."""
         ended = self.landscape.minima[bar.merge.ended]
         return self._y(bar.merge.energy[1]) - self.height(ended.energy[0])
@@ -326,7 +326,7 @@ class _TreeFigure:
     def _row(self) -> float:
         return PICTURE if self.pictures else ROW
 
-    def _entry(self, bar: Bar) -> str:
+    def _entry(self, bar: Crossbar) -> str:
         ends = [f"{self.height(energy):.6g}" for energy in bar.merge.energy]
         return f"{self.pass_names[bar.merge.number]}  {' to '.join(dict.fromkeys(ends))}"
 

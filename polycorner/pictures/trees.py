@@ -33,7 +33,7 @@ class Stem:
 
 
 @dataclass(frozen=True)
-class Bar:
+class Crossbar:
     """A horizontal line: where two components merge.
 
     Attributes
@@ -72,11 +72,11 @@ class Exit:
 
 
 @dataclass(frozen=True)
-class Tree:
+class DrawnTree:
     """Stems and bars of a landscape, ways out, and the places of its leaves by number."""
 
     stems: tuple[Stem, ...]
-    bars: tuple[Bar, ...]
+    bars: tuple[Crossbar, ...]
     exits: tuple[Exit, ...]
     places: dict[int, float]
 
@@ -86,7 +86,7 @@ class Tree:
         return next((s for s in own if energy <= s.high), own[-1])
 
 
-def tree_of(landscape: Landscape) -> Tree:
+def tree_of(landscape: Landscape) -> DrawnTree:
     """Lay out a landscape, each lowest minimum in the middle of what merges with it.
 
     Components that are nowhere joined are trees beside each other.
@@ -99,19 +99,19 @@ def tree_of(landscape: Landscape) -> Tree:
     # The components that are there, by any of their leaves.
     alive = {k: Stem((k,), x, landscape.minima[k].energy[0], inf) for k, x in places.items()}
     stems: list[Stem] = []
-    bars: list[Bar] = []
+    bars: list[Crossbar] = []
     for merge in landscape.merges:
         pair = sorted((alive[merge.kept], alive[merge.ended]), key=lambda stem: stem.across)
         stems += [Stem(s.leaves, s.across, s.low, merge.energy[1]) for s in pair]
-        bars.append(Bar(merge, pair[0].across, pair[1].across))
+        bars.append(Crossbar(merge, pair[0].across, pair[1].across))
         leaves = pair[0].leaves + pair[1].leaves
         alive |= dict.fromkeys(leaves, Stem(leaves, bars[-1].middle, merge.energy[1], inf))
     stems += {id(stem): stem for stem in alive.values()}.values()
-    drawn = Tree(tuple(stems), tuple(bars), (), places)
+    drawn = DrawnTree(tuple(stems), tuple(bars), (), places)
     return replace(drawn, exits=tuple(_exits(landscape, drawn)))
 
 
-def _exits(landscape: Landscape, tree: Tree) -> Iterator[Exit]:
+def _exits(landscape: Landscape, tree: DrawnTree) -> Iterator[Exit]:
     """Yield the lowest ways out, once for each component, without those over other minima."""
     found = set()
     for k in range(len(landscape.minima)) if landscape.region else ():

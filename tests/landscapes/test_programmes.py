@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.landscapes.programmes import Programmes
+from polycorner.landscapes.programmes import ExactProgrammes
 
 N, SIDE = 3, 2
 
@@ -38,7 +38,7 @@ FUNCTION = st.lists(NUMBERS, min_size=N + 1, max_size=N + 1)
 def test_least_values_are_those_of_vertices(functions, energy, first):
     """Functions that are held later lead to the same least value, at a point that has it."""
     box = np.array([[Fraction(-SIDE), Fraction(SIDE)]] * N, dtype=object)
-    some = Programmes(np.array(functions, dtype=object), np.array(energy, dtype=object), box)
+    some = ExactProgrammes(np.array(functions, dtype=object), np.array(energy, dtype=object), box)
     sides = [
         [Fraction(SIDE), *(Fraction(s * (i == k)) for i in range(N))]
         for k in range(N)
@@ -66,7 +66,9 @@ def test_beales_example():
     energy = ["0", "-3/4", "150", "-1/50", "6"]
     exact = [[Fraction(x) for x in row] for row in [*rows, energy]]
     box = np.array([[Fraction(0), Fraction(10)]] * 4, dtype=object)
-    some = Programmes(np.array(exact[:-1], dtype=object), np.array(exact[-1], dtype=object), box)
+    some = ExactProgrammes(
+        np.array(exact[:-1], dtype=object), np.array(exact[-1], dtype=object), box
+    )
     found = some.start.holding(range(3))
     assert found is not None
     assert some.value(found) == Fraction(-1, 20) == at(exact[-1], some.point(found))

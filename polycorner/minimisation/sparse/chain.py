@@ -22,7 +22,7 @@ CLOSE = 0.05  # largest displacement, in scale units, from which on the corner i
 
 
 @dataclass(frozen=True)
-class Landscape:
+class ChainEnergy:
     """What the chain minimises: a linear energy, and functions that are looked up near a point.
 
     All in scaled coordinates.
@@ -72,7 +72,7 @@ class ChainEnd:
 
 
 def descend(
-    land: Landscape,
+    land: ChainEnergy,
     q: Array,
     *,
     reach: float,
@@ -110,7 +110,7 @@ def descend(
     return ChainEnd(q, held, lam, limit, None)
 
 
-def solve_corner(land: Landscape, held: SparseRows, q: Array) -> FacePoint | None:
+def solve_corner(land: ChainEnergy, held: SparseRows, q: Array) -> FacePoint | None:
     """Return the corner of held functions near ``q``; None unless they determine one."""
     used = held.used
     free = used.copy()
@@ -133,7 +133,7 @@ def _with(q: Array, columns: Indices, u: Array) -> Array:
     return whole
 
 
-def _settled(land: Landscape, corner: FacePoint) -> bool:
+def _settled(land: ChainEnergy, corner: FacePoint) -> bool:
     """Whether a corner has positive multipliers and lies in the polyhedron."""
     if not (corner.multipliers > 0).all():
         return False

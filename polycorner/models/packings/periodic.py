@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from polycorner import checks
 from polycorner.formulas.rows import SparseRows
 from polycorner.kinds import checked
-from polycorner.minimisation.sparse.chain import ChainEnd, Landscape, descend
+from polycorner.minimisation.sparse.chain import ChainEnd, ChainEnergy, descend
 from polycorner.models.packings.contacts import neighbours, rows_of
 from polycorner.models.packings.jammed import JammedPacking
 from polycorner.spaces.manifold import Array
@@ -345,10 +345,10 @@ class _Scaled:
         first = int(np.argmax(used[:-1])) // d
         return np.arange(first * d, (first + 1) * d)
 
-    def landscape(self) -> Landscape:
+    def landscape(self) -> ChainEnergy:
         gradient = np.zeros(self.packing.count * self.packing.dimension + 1)
         gradient[-1] = -1.0
-        return Landscape(gradient, self.near, self.level, self.pinned)
+        return ChainEnergy(gradient, self.near, self.level, self.pinned)
 
     def jammed(self, end: ChainEnd) -> JammedPacking:
         """Return what a chain has ended at, in units of the packing."""

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class CriticalPoint(Value):
+class CriticalMember(Value):
     """A box with exactly one critical point, where the gradients of some functions are independent.
 
     Attributes
@@ -83,7 +83,7 @@ class CriticalList(Value):
     problem : Problem
         Without functions that are positive multiples of others.
     domain : Domain
-    points : tuple of CriticalPoint
+    points : tuple of CriticalMember
         With their images, each once; but no images of open ones.
     loci : tuple of LocusRegion
     undecided : (k, 2, n) array
@@ -95,7 +95,7 @@ class CriticalList(Value):
 
     problem: Problem
     domain: Domain
-    points: tuple[CriticalPoint, ...]
+    points: tuple[CriticalMember, ...]
     loci: tuple[LocusRegion, ...]
     undecided: Array
     motions: tuple[Motion, ...]
@@ -127,7 +127,7 @@ def critical_points(
     limits.run(search)
     members = (member for _, member in settled(search)[0])
     points = [
-        CriticalPoint(
+        CriticalMember(
             point_of(search, one, orbit),
             one.zeros,
             one.unknown,
@@ -163,13 +163,13 @@ def minima_on(
     return listed(search, search.problem)
 
 
-def _once(problem: Problem, points: list[CriticalPoint]) -> Iterator[CriticalPoint]:
+def _once(problem: Problem, points: list[CriticalMember]) -> Iterator[CriticalMember]:
     """Yield points, those once that whole turns around circles carry to each other.
 
     Functions that stand for images in a periodic arrangement change places with such a turn.
     """
     manifold = problem.polyhedron.manifold
-    kept: list[CriticalPoint] = []
+    kept: list[CriticalMember] = []
     middles = np.array([p.point.point for p in points]).reshape(-1, problem.dimension)
     for k, one in enumerate(points):
         near = abs(manifold.difference(middles[:k], middles[k])) / problem.scales
@@ -182,7 +182,7 @@ def _once(problem: Problem, points: list[CriticalPoint]) -> Iterator[CriticalPoi
     yield from kept
 
 
-def _is_turned(problem: Problem, one: CriticalPoint, other: CriticalPoint) -> bool:
+def _is_turned(problem: Problem, one: CriticalMember, other: CriticalMember) -> bool:
     """Whether a point is shown to be another one, carried around circles by whole turns."""
     import sympy
 
