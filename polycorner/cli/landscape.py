@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     Ways = Mapping[tuple[int, int], Barrier]
 
+FLAGS = {"cap": "--cap", "max_boxes": "--max-boxes", "max_seconds": "--seconds"}
 WORDS = "searching"
 OUTSIDE = "outside"
 LEAN = 50  # across the board for a height of one
@@ -115,7 +116,8 @@ def searched(polyhedron: "Polyhedron", energy: Any, **options: Any) -> "Landscap
         search = search_landscape if "starts" in options else proved
         return search(polyhedron, energy, **options)
     except ValueError as error:
-        fail(str(error))
+        argument, _, rest = str(error).partition(":")
+        fail(f"{FLAGS.get(argument, argument)}:{rest}")
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from polycorner.cli.atlas import STARTS, planar, skeletal
-from polycorner.cli.landscape import WORDS as PASSES
 from polycorner.cli.landscape import (
+    FLAGS,
     Telling,
     landscape_options,
     report_landscape,
     searched,
 )
+from polycorner.cli.landscape import WORDS as PASSES
 from polycorner.cli.minima import WORDS, report_minima, start_options
 from polycorner.cli.options import (
     command,
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from polycorner.proofs import Proof
 
 DRAWN = 20  # times as many random points, of which those in the set are taken first
-FLAGS = {"max_boxes": "--max-boxes", "max_seconds": "--seconds"}
 FILE = "examples/problems/circles_in_square.toml"
 
 

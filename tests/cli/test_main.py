@@ -18,7 +18,7 @@ from polycorner.cli import main as entry
 from polycorner.cli.main import EXIT_CODES, cli
 
 ROOT = Path(entry.__file__).parents[2]
-ELSEWHERE = {"completion", "sweep", "verify", "view"}  # tested in files of their own
+ELSEWHERE = {"completion", "landscape", "sweep", "verify", "view"}  # tested in files of their own
 NO_SEED = {"cache", "dyad", "prove", "paper"}  # nothing random in them
 
 

@@ -22,6 +22,7 @@ WRONG = {
 UNBOUNDED = {
     "--seed",
     "--budget",
+    "--max-boxes",
     "--starts",
     "--workers",
     "--count",

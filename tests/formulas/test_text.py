@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from landscape_values import double_well
 
 import polycorner
 from polycorner import (
@@ -23,8 +24,15 @@ from polycorner import (
 )
 from polycorner.bodies import Arrangement, disc
 from polycorner.dumbbells.viewer import descent
-from polycorner.files import load_certificate, save_certificate, save_problem
+from polycorner.files import (
+    load_certificate,
+    load_landscape,
+    save_certificate,
+    save_landscape,
+    save_problem,
+)
 from polycorner.formulas.families import Family
+from polycorner.landscapes import basins, landscape, search_landscape
 from polycorner.minimisation import stationary_on
 from polycorner.motion import (
     ContactFamily,
@@ -94,6 +102,13 @@ CASES = {
     ),
     "Proof.enclose.expression": ("expression", lambda e, _: prove(certificate()).enclose(e)),
     "descent.energy": ("energy", lambda e, _: descent(D, e, [1.0, 1.0])),
+    "landscape.energy": ("energy", lambda e, _: landscape(D, e, box=[(-1, 2), (-1, 2)])),
+    "search_landscape.energy": ("energy", lambda e, _: search_landscape(D, e, starts=[[1.0, 1.0]])),
+    "basins.energy": ("energy", lambda e, _: basins(D, e, starts=[[1.0, 1.0]])),
+    "load_landscape.energy": (
+        "energy",
+        lambda e, folder: load_landscape(save_landscape(double_well(), folder / "l.json"), D, e),
+    ),
     "load_certificate.energy": (
         "energy",
         lambda e, folder: load_certificate(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from polycorner import AnyOf, Manifold, Polyhedron
+from polycorner import Manifold
 from polycorner.dumbbells import DumbbellDrum, DumbbellPair
 from polycorner.dumbbells.pictures import (
     drum_scene,
@@ -15,13 +15,12 @@ from polycorner.dumbbells.pictures import (
     write_movie,
     write_scene,
 )
-from polycorner.dumbbells.viewer import descent, write_page
+from polycorner.dumbbells.viewer import write_page
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
 NESTED = DRUM.nested("L")
 LINE = Manifold.euclidean("x")
 (X,) = LINE.symbols
-UNION = Polyhedron(LINE, AnyOf(*Polyhedron(LINE, {"a": X, "b": -X - 1}).functions))
 
 
 def film(q, **more):
@@ -47,7 +46,6 @@ WRONG = [
     (lambda at: write_scene(pair_scene(DRUM, NESTED), at / "a.obj"), ValueError, "path"),
     (lambda at: write_page("", at / "page.txt"), ValueError, "path"),
     (lambda at: write_movie(None, at / "motion.avi"), TypeError, "run"),
-    (lambda _: descent(UNION, X, [0.5]), ValueError, "polyhedron"),
 ]
 
 
