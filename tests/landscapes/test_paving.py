@@ -261,7 +261,7 @@ def test_boxes_cover_the_set_and_are_linked_where_they_touch():
         points = rng.uniform(found.lower, found.upper, (20_000, n))
         points = points[problem.polyhedron.contains(points)]
         near = points[:2] * 0 + points[0]
-        search = module._Search(Heights(problem), found, [near, near], False, np.inf, 1e-6)
+        search = module._Refinement(Heights(problem), found, [near, near], False, np.inf, 1e-6)
         for _ in range(7):
             c = search.cells
             search.divide(np.flatnonzero(rng.uniform(size=len(c)) < 0.7))
