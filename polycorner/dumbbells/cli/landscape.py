@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from polycorner.dumbbells import RelativePlacements
     from polycorner.landscapes import Landscape
 
-HIGHEST = 1.1  # default of the cap, over the energy of the pass between the hands
-
 
 @click.command(
     cls=GroupedCommand, epilog=examples("landscape dyad --out out", "landscape dyad --rod 1 --json")
@@ -42,15 +40,13 @@ def dyad(limits: dict[str, Any], as_json: bool, out: Path | None, **options: flo
     prepare(out)
     with working("searching", "boxes") as progress:
         from polycorner.dumbbells import RelativePlacements
+        from polycorner.dumbbells.statics.depths import highest
 
         try:
             model = RelativePlacements(pair)
         except ValueError as error:
             fail(f"--rod: {str(error).removeprefix('pair: ')}")
-        # Above both ways to leave a dyad: by one contact at r^2, by two at 2 r^2.
-        limits["cap"] = (
-            _energy(model, limits["cap"]) if "cap" in limits else HIGHEST * 2 * pair.ball_radius**2
-        )
+        limits["cap"] = _energy(model, limits["cap"]) if "cap" in limits else highest(pair)
         limits |= {"box": model.box, "symmetry": model.symmetry, "progress": progress}
         found = searched(model.polyhedron, model.energy, **limits)
     unit, drawn = "mm²" if pair.is_plane else "mm", None

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.dumbbells.statics.relative import RelativePlacements
+from polycorner.dumbbells.statics.relative import RelativePlacements, height_of
 from polycorner.landscapes import Barrier, Landscape, Minimum, Pass, landscape
 from polycorner.toolkit import (
     Checked,
@@ -48,9 +48,13 @@ if TYPE_CHECKING:
 
 Bounds = tuple[float, float]
 BEYOND = 1.1  # times the energy of a pair side by side, up to which a landscape is asked for
-ROUNDINGS = 12  # at least as many as a height is computed with
 DIGITS = 12  # after the decimal point, of heights that are shown
 HANDS = {"delta_L", "delta_R"}
+
+
+def highest(pair: DumbbellPair) -> float:
+    """Return an energy beyond that of a pair side by side, over which a dyad changes its hand."""
+    return BEYOND * 2 * pair.ball_radius**2
 
 
 @dataclass(frozen=True)
@@ -102,15 +106,8 @@ class PairLandscape(Checked, Printed):
     def _height(self, energy: float, towards: float) -> float:
         if math.isinf(energy):
             return energy
-        found = energy
-        if not self.pair.is_plane:
-            rho = self.pair.centre_radius
-            # 4 (rho - d) without cancellation
-            found = 2 * energy / (rho + math.sqrt(rho**2 - energy / 2))
-        found /= self.pair.ball_heights_per_energy
-        for _ in range(ROUNDINGS):
-            found = math.nextafter(found, towards)
-        return found
+        # The height is right to within its last bit.
+        return math.nextafter(height_of(self.pair, energy), towards)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -252,7 +249,7 @@ def pair_landscape(
         model.energy,
         box=model.box,
         symmetry=model.symmetry,
-        cap=BEYOND * 2 * pair.ball_radius**2,
+        cap=highest(pair),
         max_seconds=max_seconds,
         progress=progress,
     )

@@ -64,6 +64,19 @@ DIGITS = 50  # of heights, before they are rounded
 MARGIN = 1.05  # sides of the box over the reach of contacts
 
 
+def height_of(pair: DumbbellPair, energy: float) -> float:
+    """Return the height of a pair with an energy; see :meth:`RelativePlacements.height`."""
+    most = math.inf if pair.is_plane else 2 * pair.centre_radius**2
+    value = checks.real("energy", energy, most=most, unit="mm^2")
+    weights = Fraction(4) + 2 * Fraction(pair.rod_weight)
+    if pair.is_plane:
+        return float(weights * Fraction(value) / 4)
+    with localcontext(prec=DIGITS):
+        rho, half = Decimal(pair.centre_radius), Decimal(value) / 2
+        lower = half / (rho + max(rho * rho - half, Decimal(0)).sqrt())
+        return float(Fraction(lower) * weights)
+
+
 @dataclass(frozen=True)
 class RelativePlacements(Checked):
     """Two equal dumbbells up to rolling and shifts; see the module.
@@ -189,16 +202,7 @@ class RelativePlacements(Checked):
         ValueError
             For a centre of mass above the axis.
         """
-        pair = self.pair
-        most = math.inf if pair.is_plane else 2 * pair.centre_radius**2
-        value = checks.real("energy", energy, most=most, unit="mm^2")
-        weights = Fraction(4) + 2 * Fraction(pair.rod_weight)
-        if pair.is_plane:
-            return float(weights * Fraction(value) / 4)
-        with localcontext(prec=DIGITS):
-            rho, half = Decimal(pair.centre_radius), Decimal(value) / 2
-            lower = half / (rho + max(rho * rho - half, Decimal(0)).sqrt())
-            return float(Fraction(lower) * weights)
+        return height_of(self.pair, energy)
 
     def energy_at(self, height: float) -> float:
         """Return the energy of a :meth:`height`, to within rounding.

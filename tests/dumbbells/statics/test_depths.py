@@ -201,7 +201,7 @@ def test_thick_rods_hold_no_dyad():
 
 
 def test_without_time_nothing_is_claimed():
-    one = pair_landscape(DRUM, max_seconds=0.01)
+    one = pair_landscape(DRUM, max_seconds=1e-9)  # one round of boxes, on any machine
     assert not one.landscape.complete
     assert one.depth is None
     assert "not proved" in str(one)
