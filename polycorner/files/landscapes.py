@@ -61,6 +61,7 @@ def save_landscape(landscape: Landscape, path: str | os.PathLike[str]) -> "Path"
         "cap": number(landscape.cap),
         "region": landscape.region,
         "notes": list(landscape.notes),
+        "euler": landscape.euler,
     }
     return KIND.save_json(path, content)
 
@@ -108,7 +109,7 @@ def load_landscape(
         raise KIND.refusal(path, f"is of another polyhedron or energy: {differs}")
     minima = tuple(Minimum(**_fields(Minimum, one)) for one in read["minima"])
     passes = tuple(Pass(**_fields(Pass, one)) for one in read["passes"])
-    others = {key: read[key] for key in ("proved", "cap", "region")}
+    others = {key: read[key] for key in ("proved", "cap", "region", "euler")}
     return Landscape(problem, minima, passes, notes=tuple(read["notes"]), **others)
 
 
@@ -190,6 +191,7 @@ def _read(content: Entries, problem: Problem) -> Entries:
         "cap": real(infinite=True),
         "region": flag,
         "notes": many(text),
+        "euler": optional(checks.whole),
     }
     read: Entries = entries(header)("", content)
     outside = any((s.minimum or 0) < 0 for p in read["passes"] for s in p["sides"])

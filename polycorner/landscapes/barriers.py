@@ -381,7 +381,9 @@ class Landscape(Checked, Printed):
     @property
     def statement(self) -> str:
         """What is proved, or found, in a sentence."""
-        counts = f"{len(self.minima)} minima and {len(self.passes)} passes"
+        one = len(self.minima), len(self.passes)
+        words = ("minimum" if one[0] == 1 else "minima", "pass" if one[1] == 1 else "passes")
+        counts = f"{one[0]} {words[0]} and {one[1]} {words[1]}"
         below_cap = "" if self.cap == inf else f" up to the energy {number(self.cap)}"
         if not self.complete:
             return f"Found, not proved to be all: {counts}{below_cap}."

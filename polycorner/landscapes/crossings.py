@@ -13,6 +13,7 @@ from math import comb
 import numpy as np
 
 from polycorner.landscapes.barriers import Kind
+from polycorner.landscapes.pieces import parted
 from polycorner.landscapes.walks import Mask, Orbits, Walks
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.copositivity import simplex_minimisers
@@ -233,16 +234,9 @@ def _joined(form: Array, u: Array, v: Array) -> bool:
 def _tip(
     pieces: Sequence[Piece], active: Sequence[int], shares: Array, duals: Array
 ) -> tuple[Way, ...]:
-    """Return the ways down from a minimum on all contacts at once, one for each class of pieces.
-
-    Two pieces are joined unless together they have all contacts.
-    """
-    classes: list[list[Piece]] = []
-    for piece in pieces:
-        near = [c for c in classes if any(len(piece | other) < len(active) for other in c)]
-        classes = [c for c in classes if c not in near] + [sum(near, [piece])]
+    """Return the ways down from a minimum on all contacts at once, one for each class of pieces."""
     ways = []
-    for piece, *_ in classes:
+    for piece in parted(frozenset(active), pieces):
         kept = np.array([i in piece for i in active])
         # Contacts of the piece open a little, and the others are crossed so far that this pays.
         fall = 1.0 + 2 * shares[: len(active)][kept].sum() / shares[: len(active)][~kept].sum()

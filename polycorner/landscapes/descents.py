@@ -21,6 +21,7 @@ from polycorner.intervals.balls import ball, precision
 from polycorner.landscapes.components import Component
 from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.routes import Route
+from polycorner.polyhedra.cones import least_distance
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
 
@@ -392,7 +393,7 @@ def _least_norm(
 ) -> Array | None:
     """Return the ``d`` of least ``g d + d M d / 2`` with ``a d >= b`` and ``jac d = gaps``.
 
-    By Lawson and Hanson's problem of least distance; None if nothing satisfies the conditions.
+    None if nothing satisfies the conditions.
     """
     n = len(g)
     base, null = np.zeros(n), np.eye(n)
@@ -409,19 +410,8 @@ def _least_norm(
         return np.asarray(base + null @ np.linalg.solve(chol.T, free))
     rows = np.linalg.solve(chol, (a @ null).T).T
     bound = b - a @ base - rows @ free
-    size = max(abs(bound).max(), 1e-300)
-    system = np.vstack([rows.T, bound / size])
-    target = np.zeros(len(system))
-    target[-1] = 1.0
-    try:
-        weights, _ = nnls(system, target)
-    except RuntimeError:
-        return None
-    rest = system @ weights - target
-    if not rest[-1] < -1e-14:
-        return None
-    z = -rest[:-1] / rest[-1] * size
-    return np.asarray(base + null @ np.linalg.solve(chol.T, free + z))
+    z = least_distance(rows, bound)
+    return None if z is None else np.asarray(base + null @ np.linalg.solve(chol.T, free + z))
 
 
 def _multipliers(metric: Array, g: Array, a: Array, jac: Array, d: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from polycorner.minimisation.feasibility import approach
 from polycorner.minimisation.problem import Problem
-from polycorner.polyhedra.cones import unit_rows
+from polycorner.polyhedra.cones import least_distance, unit_rows
 from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
@@ -55,13 +55,7 @@ class Slope:
         return max(ways, key=lambda way: float(way[0] @ self.downhill))
 
     def _allowed(self, piece: list[int], length: float) -> Array:
-        """Return the step nearest to the downhill one that is allowed; no step if none is.
-
-        The least ``x`` with ``N x >= h`` is read off the residual of a non-negative least-squares
-        problem ([LawsonHanson] ch. 23).
-        """
-        from scipy.optimize import nnls
-
+        """Return the step nearest to the downhill one that is allowed; no step if none is."""
         m = self.problem.inequalities
         near = [i for i in piece if self.away[i] < 2 * length]
         rows = [*near, *range(m, len(self.away))]
@@ -70,14 +64,8 @@ class Slope:
             normals = np.vstack([normals, -self.normals[m:]])
             away = np.append(away, -self.away[m:])
         free = length * self.downhill
-        short = -away - normals @ free
-        if not (short > 0).any():
-            return free
-        goal = np.zeros(len(free) + 1)
-        goal[-1] = 1.0
-        weights, _ = nnls(np.vstack([normals.T, short]), goal)
-        rest = 1 - short @ weights
-        return free + normals.T @ weights / rest if rest > DEFAULT.rounding else 0 * free
+        more = least_distance(normals, -away - normals @ free)
+        return 0 * free if more is None else free + more
 
 
 def steepest(problem: Problem, start: Array, stride: float, most: int = MOST) -> list[Array]:

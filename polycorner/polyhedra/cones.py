@@ -7,6 +7,7 @@ import numpy as np
 
 from polycorner.errors import SolverError
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 
 def unit_rows(matrix: Array) -> Array:
@@ -125,6 +126,27 @@ def linear_programme(
         msg = f"HiGHS found no solution of a small linear programme: {result.message}"
         raise SolverError(msg)
     return np.asarray(result.x)
+
+
+def least_distance(rows: Array, least: Array) -> Array | None:
+    """Return the shortest ``x`` with ``rows x >= least``; None if nothing satisfies that.
+
+    Read off the residual of a non-negative least-squares problem ([LawsonHanson] ch. 23).
+    """
+    from scipy.optimize import nnls
+
+    size = abs(least).max(initial=0.0)
+    if not size > 0:
+        return np.zeros(rows.shape[1])
+    goal = np.zeros(rows.shape[1] + 1)
+    goal[-1] = 1.0
+    system = np.vstack([rows.T, least / size])
+    try:
+        weights, _ = nnls(system, goal)
+    except RuntimeError:  # it did not converge
+        return None
+    rest = goal - system @ weights
+    return np.asarray(-rest[:-1] / rest[-1] * size) if rest[-1] > DEFAULT.rounding else None
 
 
 def independent_rows(matrix: Array, tolerance: float) -> list[int]:

@@ -1,5 +1,6 @@
 """Landscapes in files: read to the last bit, and refused where functions differ."""
 
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -147,3 +148,9 @@ def test_another_file_is_refused(tmp_path):
     path.write_text(path.read_text().replace('"cap": ', '"cap": 1'))
     with pytest.raises(ValueError, match="was changed after it was written"):
         load_landscape(path)
+
+
+@pytest.mark.parametrize("euler", [None, -1])
+def test_the_euler_characteristic_is_kept(euler, tmp_path):
+    kept = save_landscape(replace(double_well(), euler=euler), tmp_path / "l.json")
+    assert load_landscape(kept).euler == euler
