@@ -23,6 +23,7 @@ from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.routes import Route
 from polycorner.polyhedra.cones import least_distance
 from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
 
 if TYPE_CHECKING:
@@ -45,6 +46,10 @@ class DescentOptions:
         Part of what the energy has fallen that margins may cost.
     most : int
         Steps.
+    stalled : float
+        Part of the longest step allowed, below which a descent is at rest.
+    stiff : float
+        Least curvature of the model, over the largest, or over the pull by the longest step.
     """
 
     first: float = 0.1
@@ -53,6 +58,8 @@ class DescentOptions:
     margin: float = 0.02
     spent: float = 0.1
     most: int = 600
+    stalled: float = 1e-3
+    stiff: float = 1e-6
 
 
 OPTIONS = DescentOptions()
@@ -242,7 +249,7 @@ class Descents:
                     return None
                 continue
             on, length = moved
-            if length < 1e-3 * step:
+            if length < self.options.stalled * step:
                 # At rest beside a minimum, or on the way to a saddle: off it by chance.
                 stalled += 1
                 if stalled > 8:
@@ -359,7 +366,8 @@ class Descents:
         for _ in range(2):  # without multipliers, then with those of the first step
             form = (bend - np.einsum("i,ijk->jk", lam, bends))[np.ix_(free, free)]
             w, v = np.linalg.eigh(0.5 * (form + form.T))
-            w = np.maximum(abs(w), 1e-6 * max(pull / step, abs(w).max(initial=0.0)))
+            w = abs(w)
+            w = np.maximum(w, self.options.stiff * max(pull / step, w.max(initial=0.0)))
             metric, tau = np.eye(len(g)), 0.0
             for _ in range(8):
                 metric[np.ix_(free, free)] = (v * (w + tau)) @ v.T
@@ -399,7 +407,7 @@ def _least_norm(
     base, null = np.zeros(n), np.eye(n)
     if len(jac):
         u, s, vt = np.linalg.svd(jac)
-        rank = int((s > 1e-10 * s.max(initial=0.0)).sum())
+        rank = int((s > DEFAULT.rank * s.max(initial=0.0)).sum())
         base = vt[:rank].T @ ((u.T @ gaps)[:rank] / s[:rank])
         null = vt[rank:].T
     reduced = null.T @ metric @ null

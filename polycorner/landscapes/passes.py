@@ -441,7 +441,7 @@ class Sorted:
                 alike = (node.target.part is None) == (other.target.part is None)
                 if (
                     alike
-                    and apart.max() < 1e-7
+                    and apart.max() < DEFAULT.same
                     and (not other.target.part or other.target.part.has(q))
                 ):
                     here.append(k)
