@@ -12,17 +12,16 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.dynamics import (
-    Coefficients,
     between,
     energies,
     friction_of,
     masses_of,
     smooth,
-    without,
 )
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
+from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
 from polycorner.bodies.pairs import PlacedPart, Tree, apart, distances, members
@@ -39,7 +38,6 @@ from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
 ORIENTATIONS = ("needed", "all", "none")
-BETWEEN = "between"  # the name of the contacts among repeated bodies
 
 
 def named(given: Any) -> dict[str, Body]:
@@ -299,10 +297,10 @@ class Arrangement(Checked):
         return pairs(self.lattice, self.placements, dict(self.fixed))
 
     @cached_property
-    def at_walls(self) -> list[tuple[Wall, SmoothFunction, PlacedPart, Array]]:
-        """The gaps at walls with parts and their points."""
+    def at_walls(self) -> list[tuple[Wall, SmoothFunction, PlacedPart, Array, str]]:
+        """The gaps at walls with parts, their points, and the names of the walls."""
         return [
-            (wall, function, member, point)
+            (wall, function, member, point, name)
             for name, wall in self.walls.items()
             for p in self.placements
             for member in members(p.name, p.body, p)
@@ -317,7 +315,7 @@ class Arrangement(Checked):
         masses: Mapping[str, Mass] | None = None,
         friction: Coefficients = 0.0,
         rolling: Coefficients = 0.0,
-        restitution: float | Mapping[str, float] = 0.0,
+        restitution: Restitution = 0.0,
         exits: Mapping[str, float] | None = None,
         count: int = 1,
     ) -> System:
@@ -336,16 +334,21 @@ class Arrangement(Checked):
         density : float, optional
             Mass per area or volume of bodies without a mass of their own.
         masses : mapping from str to Mass, optional
-        friction : float, (float, float), or mapping from str to these, optional
-            Coulomb's coefficient, or a static and a dynamic one, for all contacts or by name; needs
-            ``orientations="all"``.  The name of the contacts among repeated bodies is
+        friction : float, (float, float), or mapping from str or (str, str) to these, optional
+            Coulomb's coefficient, or a static and a dynamic one; needs ``orientations="all"``.  It
+            is for all contacts, or by name: of a contact, ``"A.v1-floor"``, of a pair of what
+            touches, ``("A", "floor")`` or ``"A-floor"``, of a wall or fixed body, ``"floor"``, or
+            of a body, ``"A"``.  The first of these that is given holds.  Two bodies whose own
+            values differ need one for the pair.  Contacts among repeated bodies are also called
             ``"between"``.
         rolling : the same, optional
             Coefficients of rolling resistance: the torque across the normal is at most
             ``mu r N`` for a part rounded by ``r`` at a wall or a fixed body of edges, ``mu N r s /
             (r + s)`` for two rounded parts; none at the sides of polygons and polyhedra.
-        restitution, exits : optional
+        restitution : float or mapping from str or (str, str) to float, optional
             As in :class:`~polycorner.System`; names as for ``friction``.
+        exits : mapping from str to float, optional
+            As in :class:`~polycorner.System`.
         count : int, optional
             Default 1.
 
@@ -369,24 +372,26 @@ class Arrangement(Checked):
         """
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1 for several bodies; one body may be repeated", count)
-        known = masses_of(self.placements, density, {} if masses is None else masses)
-        laws = energies(self.placements, known, gravity, self.turning)
+        weights = masses_of(self.placements, density, {} if masses is None else masses)
+        laws = energies(self.placements, weights, gravity, self.turning)
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
-        walls = [(f.name, wall, member, point) for wall, f, member, point in self.at_walls]
-        family = None
+        walls = [(f.name, wall, member, point) for wall, f, member, point, _ in self.at_walls]
+        meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
+        meetings += [Meeting(f.name, member.body, on) for _, f, member, _, on in self.at_walls]
+        family, first = None, self.placements[0]
+        meetings += [Meeting(f"{first.name}-{first.name}", *[first.name] * 2, True)] * (count > 1)
+        known = laws_of(friction, rolling, restitution, meetings, self.named)
         if count > 1:
-            check_width(self.lattice, self.placements[0], [*self.fixed.values()])
-            friction, rubbing = without(friction, BETWEEN)
-            rolling, turning = without(rolling, BETWEEN)
-            restitution, bouncing = without(restitution, BETWEEN)
-            family = between(self.placements[0], self.lattice, rubbing, turning, bouncing)
+            check_width(self.lattice, first, [*self.fixed.values()])
+            family = between(first, self.lattice, known)
         free = count > 1 and self.lattice.axes and not (self.pairs or self.at_walls)
-        lone = own_image(self.lattice, self.placements[0]) if free else {}
+        lone = own_image(self.lattice, first) if free else {}
+        placed = smooth(Polyhedron(self.manifold, lone or AllOf(*self.contacts(excluded=False))))
         return System(
-            smooth(Polyhedron(self.manifold, lone or AllOf(*self.contacts(excluded=False)))),
+            placed,
             *laws,
-            friction_of(self.manifold, touches, walls, friction, rolling),
-            restitution=restitution,
+            friction_of(self.manifold, touches, walls, known.friction, known.rolling),
+            restitution={f.name: known.restitution.get(f.name, 0.0) for f in placed.functions},
             count=count,
             between=family,
             exits={} if exits is None else exits,

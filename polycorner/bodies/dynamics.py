@@ -13,6 +13,7 @@ from polycorner import checks
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice
+from polycorner.bodies.laws import Both, Laws
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.neighbours import pairs
 from polycorner.bodies.pairs import PlacedPart, Touch, distances
@@ -43,8 +44,7 @@ from polycorner.tolerances import DEFAULT
 if TYPE_CHECKING:
     import sympy
 
-Coefficient = float | tuple[float, float]  # static and dynamic
-Coefficients = Coefficient | Mapping[str, Coefficient]
+NONE = (0.0, 0.0)  # no friction
 
 
 def masses_of(placements: tuple[Placement, ...], density: float, given: Any) -> dict[str, Mass]:
@@ -205,8 +205,8 @@ def friction_of(
     manifold: Manifold,
     touches: list[Touch],
     walls: list[AtWall],
-    sliding: Coefficients,
-    rolls: Coefficients,
+    sliding: Mapping[str, Both],
+    rolls: Mapping[str, Both],
 ) -> tuple[Friction, ...]:
     """Return dry friction and rolling resistance where a coefficient is positive."""
     space = motions(manifold)
@@ -218,17 +218,15 @@ def friction_of(
     slips |= {touch[0]: partial(slips_at_wall, space, touch) for touch in walls}
     laws: list[Callable[..., Friction]] = []
     rows: list[tuple[SmoothFunction, ...]] = []
-    for argument, given, kind, verb in (
+    for argument, by_name, kind, verb in (
         ("friction", sliding, SLIDING, "slips"),
         ("rolling", rolls, ROLLING, "rolls"),
     ):
-        by_name = given if isinstance(given, Mapping) else dict.fromkeys(slips, given)
-        checks.names(argument, by_name, slips)
-        for label, value in by_name.items():
-            static, dynamic = _both(argument, value)
+        for label in slips:
+            static, dynamic = by_name.get(label, NONE)
             if static == 0:
                 continue
-            _check_turning(argument, rubbing[label], value)
+            _check_turning(argument, rubbing[label], static)
             d = rubbing[label][0].part.dimension
             sticks, slides = _set(static, d), _set(dynamic, d)
             law = partial(Friction, f"{label} {verb}", static=sticks, load=label, dynamic=slides)
@@ -239,18 +237,6 @@ def friction_of(
         law(slip=tuple(islice(shared, len(components))))
         for law, components in zip(laws, rows, strict=True)
     )
-
-
-def _both(argument: str, given: Any) -> tuple[float, float]:
-    """Return the static and the dynamic one of a coefficient, which may be the same."""
-    expected = "a coefficient >= 0, or a pair of a static and a smaller dynamic one"
-    pair = np.array(checks.numbers(argument, given, expected), dtype=np.float64)
-    if pair.shape not in {(), (2,)} or not np.isfinite(pair).all() or (pair < 0).any():
-        refuse(argument, expected, given)
-    static, dynamic = np.broadcast_to(pair, 2).tolist()
-    if dynamic > static:
-        refuse(argument, expected, given)
-    return static, dynamic
 
 
 def _set(mu: float, dimension: int) -> ConvexSet:
@@ -264,13 +250,11 @@ def _check_turning(argument: str, rubbing: list[PlacedPart], given: Any) -> None
             refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
-def between(
-    p: Placement, lattice: Lattice, mu: Coefficient, rolls: Coefficient, restitution: float
-) -> ContactFamily:
-    """Return the contacts of any two of several bodies like one, with friction if ``mu > 0``.
+def between(p: Placement, lattice: Lattice, known: Laws) -> ContactFamily:
+    """Return the contacts of any two of several bodies like one, by the laws of a pair of it.
 
-    The two are called after the body, with 1 and 2, and so are their coordinates.  They resist
-    rolling if ``rolls > 0``.  In a periodic box the second is the nearest image.
+    The two are called after the body, with 1 and 2, and so are their coordinates.  In a periodic
+    box the second is the nearest image.
     """
     pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
     space = pair[0].manifold * pair[1].manifold
@@ -278,14 +262,15 @@ def between(
     touches = [t for parts in meeting for t in distances(space, *parts)]
     definitions, gaps = written_out({t.gap.name: t.gap for t in touches})
     both, laws = motions(space), []
+    name = f"{p.name}-{p.name}"
     for argument, given, kind, cause in (
-        ("friction", mu, SLIDING, RUBBING),
-        ("rolling", rolls, ROLLING, ROLLING),
+        ("friction", known.friction, SLIDING, RUBBING),
+        ("rolling", known.rolling, ROLLING, ROLLING),
     ):
-        static, dynamic = _both(argument, given)
+        static, dynamic = given.get(name, NONE)
         if static == 0:
             continue
-        _check_turning(argument, [*meeting[0]], given)
+        _check_turning(argument, [*meeting[0]], static)
         sets = _set(static, p.body.dimension), _set(dynamic, p.body.dimension)
         slips = {t.gap.name: slips_of(both, t, kind) for t in touches}
         laws.append(PairFriction(slips, *sets, cause))
@@ -294,7 +279,7 @@ def between(
         2 * p.body.size / p.manifold.scales[0],
         p.manifold.names[:2],
         friction=tuple(laws),
-        restitution=restitution,
+        restitution=known.restitution.get(name, 0.0),
         definitions=definitions,
     )
 
@@ -314,10 +299,3 @@ def smooth(polyhedron: Polyhedron) -> Polyhedron:
         )
         raise NotImplementedError(msg)
     return polyhedron
-
-
-def without(given: Any, name: str) -> tuple[Any, Any]:
-    """Return coefficients by name without one, and that one; one for all is both."""
-    if not isinstance(given, Mapping):
-        return given, given
-    return {k: v for k, v in given.items() if k != name}, given.get(name, 0.0)

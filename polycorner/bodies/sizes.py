@@ -156,7 +156,7 @@ def scaled(
         )
         for one, two in arrangement.pairs
     ]
-    for wall, function, member, _ in arrangement.at_walls:
+    for wall, function, member, *_ in arrangement.at_walls:
         radius = member.part.radius
         moving = radius if isinstance(wall, HalfSpace) else -radius
         gaps.append(_lifted(function, manifold, partial(_larger, False, moving)))

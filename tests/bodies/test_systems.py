@@ -361,5 +361,5 @@ def test_coefficients_by_name():
     assert not system.friction
     assert [law.kind for law in system.between.friction] == ["rubbing"]
     assert system.between.restitution == 0.5
-    with pytest.raises(ValueError, match="friction: expected names among A-ground"):
+    with pytest.raises(ValueError, match="friction: expected names among A, ground, pairs"):
         a.system(friction={"A-wall": 0.3})
