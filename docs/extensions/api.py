@@ -118,6 +118,11 @@ GROUPS = (
         },
     ),
     Group(
+        "Join bodies",
+        "Joints between bodies, or with space, as equations and limits of placements.",
+        {"bodies": "Joint Hinge Slider Ball Fixed Rail Planar Gear"},
+    ),
+    Group(
         "Simulate motion",
         "Bodies with contacts, impacts and friction: a system, a start, a trajectory.",
         {

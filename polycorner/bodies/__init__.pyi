@@ -1,4 +1,5 @@
 from .arrangement import Arrangement
+from .joints import Ball, Fixed, Gear, Hinge, Joint, Planar, Rail, Slider
 from .masses import Mass, mass_of
 from .shapes import Body, Part, capsule, compound, disc, polygon, polytope, sphere
 from .sizes import scaled, thinned
@@ -6,11 +7,19 @@ from .walls import Cylinder, HalfSpace, box
 
 __all__ = [
     "Arrangement",
+    "Ball",
     "Body",
     "Cylinder",
+    "Fixed",
+    "Gear",
     "HalfSpace",
+    "Hinge",
+    "Joint",
     "Mass",
     "Part",
+    "Planar",
+    "Rail",
+    "Slider",
     "box",
     "capsule",
     "compound",

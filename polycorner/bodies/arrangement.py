@@ -4,13 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import mul
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies.congruences import Congruences
+from polycorner.bodies.constraints import orients
 from polycorner.bodies.dynamics import (
     between,
     energies,
@@ -18,15 +19,16 @@ from polycorner.bodies.dynamics import (
     masses_of,
     smooth,
 )
-from polycorner.bodies.frames import Frame
+from polycorner.bodies.joints import AnyJoint
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.masses import Mass
+from polycorner.bodies.mechanisms import Mechanism, check_joints, closed, completed, moved_along
 from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
 from polycorner.bodies.pairs import PlacedPart, Tree, apart, distances, members
-from polycorner.bodies.poses import Placement, frame_of
-from polycorner.bodies.shapes import Body, Turn, turning
+from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
+from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
@@ -36,6 +38,9 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
+
+if TYPE_CHECKING:
+    import sympy
 
 ORIENTATIONS = ("needed", "all", "none")
 
@@ -68,64 +73,6 @@ def check_together(
         for name, one in several.items():
             if one.dimension != body.dimension:
                 refuse(argument, f"all in {space}, like {first!r}", name)
-
-
-def coordinates(placed: Any, placements: Sequence[Placement]) -> Array:
-    """Return the coordinates of all bodies where a user places them."""
-    names = [p.name for p in placements]
-    checks.names("placed", checks.mapping("placed", placed), names)
-    missing = [name for name in names if name not in placed]
-    if missing:
-        refuse("placed", f"a placement of {missing[0]!r} as well", [*placed])
-    found = []
-    for p in placements:
-        origin, matrix = _placement(placed[p.name], p.body.dimension)
-        fixed = p.frame is Frame.SHIFTED and not p.is_round
-        if fixed and (matrix != np.eye(len(origin))).any():
-            expected = f"no rotation of {p.name!r}, which is shifted only"
-            refuse("placed", expected, placed[p.name])
-        found.append(p.coordinates(origin, matrix))
-    return np.concatenate(found)
-
-
-def _placement(given: Any, d: int) -> tuple[Array, Array]:
-    """Return origin and matrix of what a user gives for a placement."""
-    turn: Turn | None = None
-    expected = f"{d} numbers, or a pair of them and a rotation"
-    if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
-        given, turn = given
-    origin = checks.numbers("placed", given, expected)
-    if origin.shape != (d,):
-        refuse("placed", expected, given)
-    return origin, turning(turn, d)
-
-
-def rates(point: Array, moving: Any, placements: Sequence[Placement]) -> Array:
-    """Return the velocities of the coordinates of all bodies, which a user sets in motion."""
-    checks.names("moving", checks.mapping("moving", moving), [p.name for p in placements])
-    found = [p.rates(point, *_motion(moving.get(p.name), p)) for p in placements]
-    return np.concatenate(found)
-
-
-def _motion(given: Any, p: Placement) -> tuple[Array, Array]:
-    """Return velocity ``(d,)`` and angular velocity ``(3,)`` of what a user gives for a motion."""
-    d = p.body.dimension
-    spins = "a number" if d == 2 else "3 numbers"
-    expected = f"{d} finite numbers for {p.name!r}, or a pair of them and {spins}"
-    if given is None:
-        return np.zeros(d), np.zeros(3)
-    turn: Any = np.zeros(3)
-    if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
-        given, turn = given
-        turn = checks.numbers("moving", turn, expected)
-        turn = np.array([0.0, 0.0, turn]) if d == 2 and turn.ndim == 0 else turn
-    velocity = checks.numbers("moving", given, expected)
-    fits = velocity.shape == (d,) and turn.shape == (3,)
-    if not fits or not np.isfinite([*velocity, *turn]).all():
-        refuse("moving", expected, given)
-    if turn.any() and p.frame is Frame.SHIFTED:
-        refuse("moving", f"no angular velocity of {p.name!r}, which is shifted only", turn)
-    return velocity, turn
 
 
 def angular(argument: str, given: Any, d: int) -> float | Array:
@@ -174,6 +121,11 @@ class Arrangement(Checked):
         Angular velocity in rad/s, about the origin, of the axes with all that stands in them, for
         motion.  Velocities and energies are those in the axes, with the potential of the
         centrifugal force; gravity keeps the directions of the axes at the time 0.  Default 0.
+    joints : mapping from str to Hinge, Slider, Ball, Fixed, Rail, Planar or Gear, optional
+        Equations ``<name>.x``, ... of the placements, and the inequalities ``<name>.min`` and
+        ``<name>.max`` of limits.  Bodies that a joint connects do not touch each other, unless it
+        says ``collide=True``.  They have all coordinates of an orientation, unless joints hold
+        them on their axis alone.
 
     Raises
     ------
@@ -213,6 +165,7 @@ class Arrangement(Checked):
     unit: str = ""
     period: Sequence[float | None] | None = None
     turning: ArrayLike = 0.0
+    joints: Mapping[str, AnyJoint] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bodies", named(self.bodies))
@@ -227,6 +180,12 @@ class Arrangement(Checked):
         checks.instance("unit", self.unit, str)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
         check_together(self.named, self.fixed, self.walls)
+        object.__setattr__(self, "joints", dict(checks.mapping("joints", self.joints)))
+        check_joints(self.joints, self.named, self.fixed)
+        if self.joints and self.orientations == "none":
+            refuse("orientations", "'needed' or 'all' where there are joints", "none")
+        if self.joints and self.lattice.axes:
+            refuse("period", "none where there are joints", self.period)
         if self.period is not None:
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
         check_room(self.lattice, self.placements, self.walls)
@@ -260,7 +219,8 @@ class Arrangement(Checked):
         turns = self.lattice.turns([*self.named.values()], [*self.fixed.values()])
         periods = (self.lattice.lengths * turns).tolist()
         for name, body in self.named.items():
-            frame = frame_of(body, self.orientations)
+            held = any(orients(joint, name, body) for joint in self.joints.values())
+            frame = frame_of(body, "all" if held else self.orientations)
             turn = self.scale / max(body.size, self.scale)
             units = self.scale, turn, self.unit
             factor = frame.manifold(name, self.dimension, *units, periods)
@@ -276,8 +236,18 @@ class Arrangement(Checked):
 
     @cached_property
     def polyhedron(self) -> Polyhedron:
-        """``D``, the placements without overlap."""
-        return Polyhedron(self.manifold, AllOf(*self.contacts(excluded=True)))
+        """``D``, the placements without overlap in which joints hold."""
+        return self._joined(self.contacts(excluded=True))
+
+    def _joined(self, parts: list[Tree]) -> Polyhedron:
+        """Return placements with the limits and equations of joints."""
+        limits = [SmoothFunction(*one, self.manifold) for one in self.mechanism.limits.items()]
+        return Polyhedron(self.manifold, AllOf(*parts, *limits), self.mechanism.equations)
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The formulas of joints."""
+        return Mechanism(self.joints, self.placements)
 
     def contacts(self, *, excluded: bool) -> list[Tree]:
         """Return the and/or trees of all pairs of parts, and the gaps at walls.
@@ -287,14 +257,16 @@ class Arrangement(Checked):
         """
         found = [apart(self.manifold, *pair, excluded=excluded) for pair in self.pairs]
         found += [function for _, function, *_ in self.at_walls]
-        if not found:
+        if not (found or self.joints):
             refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
         return together(found)
 
     @cached_property
     def pairs(self) -> list[Pair]:
         """Two parts each, of different bodies of which one moves, and of a body and its image."""
-        return pairs(self.lattice, self.placements, dict(self.fixed))
+        found = pairs(self.lattice, self.placements, dict(self.fixed))
+        joined = self.mechanism.apart
+        return [pair for pair in found if frozenset(m.body for m in pair) not in joined]
 
     @cached_property
     def at_walls(self) -> list[tuple[Wall, SmoothFunction, PlacedPart, Array, str]]:
@@ -386,7 +358,8 @@ class Arrangement(Checked):
             family = between(first, self.lattice, known)
         free = count > 1 and self.lattice.axes and not (self.pairs or self.at_walls)
         lone = own_image(self.lattice, first) if free else {}
-        placed = smooth(Polyhedron(self.manifold, lone or AllOf(*self.contacts(excluded=False))))
+        joined = None if lone else self._joined(self.contacts(excluded=False))
+        placed = smooth(joined or Polyhedron(self.manifold, lone))
         return System(
             placed,
             *laws,
@@ -420,20 +393,60 @@ class Arrangement(Checked):
     @cached_property
     def _congruences(self) -> Congruences:
         around = tuple(self.walls.values()), tuple(self.fixed.values()), self.lattice
-        return Congruences(self.placements, *around)
+        joined = frozenset(name for joint in self.joints.values() for name in joint.bodies)
+        return Congruences(self.placements, *around, joined)
 
-    def point(self, placed: Mapping[str, Any]) -> Array:
+    def point(self, placed: Mapping[str, Any], joints: Mapping[str, Any] | None = None) -> Array:
         """Return the point of given placements, ``(N,)``.
 
         Parameters
         ----------
         placed : mapping from str to placement
             For every body its origin ``(d,)``, or a pair of this and an angle in radians (in the
-            plane) or a :class:`scipy.spatial.transform.Rotation` (in space).
-        """
-        return coordinates(placed, self.placements)
+            plane) or a :class:`scipy.spatial.transform.Rotation` (in space).  Bodies that joints
+            connect with these, with fixed bodies or with space may be left out.
+        joints : mapping from str to float, optional
+            Angles and positions of joints by which bodies are placed that were left out; of a
+            :class:`Ball` its rotation.  Default 0.
 
-    def velocity(self, q: ArrayLike, moving: Mapping[str, Any]) -> Array:
+        Notes
+        -----
+        Where joints do not hold, as in closed loops, the nearest point follows at which they do
+        (:meth:`closed`).
+        """
+        known = completed(self.mechanism, placed, {} if joints is None else joints, self.fixed)
+        q = coordinates(known, self.placements)
+        return self.closed(q) if self.joints else q
+
+    def closed(self, q: ArrayLike) -> Array:
+        """Return the nearest point ``(N,)`` at which joints hold, in units of the manifold.
+
+        Limits and contacts do not count.
+
+        Raises
+        ------
+        ValueError
+            Naming the equation that fails most where Newton's method finds no such point.
+        """
+        return closed(self.polyhedron, self.manifold.point(q))
+
+    def joint_function(self, name: str) -> "sympy.Expr":
+        """Return the angle (in radians, up to half a turn) or the position of a joint as a formula.
+
+        Its sign is told at :class:`Hinge` and :class:`Slider`.
+        """
+        return self.mechanism.coordinate(checks.instance("name", name, str), "name").value()
+
+    def joint_values(self, q: ArrayLike) -> dict[str, Array]:
+        """Return the angles and positions of all joints that have one, ``(...)`` at ``(..., N)``.
+
+        Angles are within half a turn; :func:`numpy.unwrap` follows them along a path.
+        """
+        return self.mechanism.values(self.manifold, self.manifold.points(q))
+
+    def velocity(
+        self, q: ArrayLike, moving: Mapping[str, Any], joints: Mapping[str, float] | None = None
+    ) -> Array:
         """Return the velocities of the coordinates ``(N,)`` of bodies that move at a point.
 
         Parameters
@@ -442,8 +455,17 @@ class Arrangement(Checked):
         moving : mapping from str to velocity
             For bodies that do not rest the velocity of the origin ``(d,)``, or a pair of this and
             the angular velocity in rad/s: counterclockwise, or ``(3,)`` in the axes of space.
+        joints : mapping from str to float, optional
+            Rates of angles and positions of joints.  Where there are joints, the velocities are the
+            nearest ones along all equations, with these rates.
         """
-        return rates(self.manifold.point(q), moving, self.placements)
+        point = self.manifold.point(q)
+        found = rates(point, moving, self.placements)
+        asked = checks.mapping("joints", {} if joints is None else joints)
+        checks.names("joints", asked, self.joints)
+        if not self.joints:
+            return found
+        return moved_along(self.polyhedron, self.mechanism, point, found, asked)
 
     def placed(self, q: ArrayLike) -> dict[str, Body]:
         """Return the bodies where they are at a point ``(N,)``, fixed ones last.

@@ -170,13 +170,15 @@ class Congruences(Value):
     """The motions and exchanges of bodies that change no gap.
 
     A velocity ``w + omega x p`` of the whole is one if it keeps every wall, every fixed body and
-    the periods: linear equations in ``(w, omega)``.
+    the periods: linear equations in ``(w, omega)``.  Bodies that joints connect, ``joined``, are
+    only moved as a whole, and not at all where one of them is space or a fixed body.
     """
 
     placements: tuple[Placement, ...]
     walls: "tuple[Wall, ...]"
     fixed: tuple[Body, ...]
     lattice: Lattice
+    joined: frozenset[str] = frozenset()
 
     @property
     def dimension(self) -> int:
@@ -196,6 +198,8 @@ class Congruences(Value):
         rows += [velocity(v) - velocity(np.zeros(d)) for v in self.lattice.directions]
         if any(p.frame is Frame.SHIFTED and not p.is_round for p in self.placements):
             rows.append(np.eye(rows[0].shape[1])[d:])
+        if not self.joined <= {p.name for p in self.placements}:
+            rows.append(np.eye(rows[0].shape[1]))
         basis = scipy.linalg.null_space(np.concatenate(rows), rcond=DEFAULT.alike).T
         return reduced(basis) if len(basis) else basis
 
@@ -206,9 +210,9 @@ class Congruences(Value):
         """
         fields, d = [*map(self._field, self.motions), *self._spins()], self.dimension
         carrying = [(np.zeros(d), np.eye(d))]
-        if full:
+        if full and not self.joined:
             carrying = isometries(self.walls, self.fixed, self.lattice, self.motions[:, d:])
-        found = elements(self.placements, polyhedron, self._shifts(), carrying)
+        found = elements(self.placements, polyhedron, self._shifts(), carrying, self.joined)
         invariants = self.invariants if fields else None
         return Symmetry(fields=fields, invariants=invariants, elements=tuple(found))
 
@@ -242,7 +246,7 @@ class Congruences(Value):
     def _spins(self) -> "Iterator[dict[str, sympy.Expr]]":
         """Rotations of bodies of revolution about their own axes."""
         for p in self.placements:
-            if not p.spins or p.body.axis is None:
+            if not p.spins or p.body.axis is None or p.name in self.joined:
                 continue
             names, symbols = p.manifold.names, p.manifold.symbols
             if p.frame is Frame.TURNED:
@@ -292,7 +296,10 @@ class Congruences(Value):
         centres = places - centre
         centres[:, list(self.lattice.axes)] = 0.0
         centres = (centres - along @ centres.mean(axis=0)) / self.placements[0].manifold.scales[0]
-        ways = [p.directions(q) / p.manifold.scales[-1] for p in self.placements]
+        ways = [
+            p.directions(q, whole=p.name in self.joined) / p.manifold.scales[-1]
+            for p in self.placements
+        ]
         if len(axes) == d:
             return np.concatenate([around, centres.ravel(), *(w.ravel() for w in ways)])
         points = np.concatenate([np.zeros((1, d)), centres])

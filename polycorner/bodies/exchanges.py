@@ -35,15 +35,20 @@ def elements(
     polyhedron: Polyhedron,
     shifts: Sequence[Sequence[Array]],
     isometries: Sequence[Isometry],
+    joined: frozenset[str] = frozenset(),
 ) -> Iterator[Element]:
     """Yield exchanges of equal bodies with rotations of bodies onto themselves, no identity.
 
     With them go ``isometries`` of space, and ``shifts`` of each body; the first ones of both change
-    nothing.  None where there would be more than ten thousand.  How functions change their names is
+    nothing.  Bodies that are ``joined`` to others stay where they are.  None where there would be
+    more than ten thousand.  How functions change their names is
     found by their values at random points and at the images of these.
     """
-    groups = _equal(placements)
-    turns = [[_own_turns(p, matrix) for p in placements] for _, matrix in isometries]
+    groups = _equal(placements, joined)
+    turns = [
+        [_own_turns(p, matrix)[: 1 if p.name in joined else None] for p in placements]
+        for _, matrix in isometries
+    ]
     count = sum(math.prod(map(len, some)) for some in turns) * math.prod(map(len, shifts))
     count *= math.prod(math.factorial(len(group)) for group in groups)
     if count > MOST_ELEMENTS:
@@ -62,12 +67,13 @@ def elements(
         yield Element(change, _renaming(polyhedron.names, values.T, images.T))
 
 
-def _equal(placements: tuple[Placement, ...]) -> list[list[int]]:
-    """Return the bodies in groups of equal ones, by number."""
+def _equal(placements: tuple[Placement, ...], joined: frozenset[str]) -> list[list[int]]:
+    """Return the bodies in groups of equal ones that may change places, by number."""
     groups: list[list[int]] = []
     for k, p in enumerate(placements):
         for group in groups:
-            if placements[group[0]].body.same(p.body):
+            one = placements[group[0]]
+            if joined.isdisjoint((one.name, p.name)) and one.body.same(p.body):
                 group.append(k)
                 break
         else:

@@ -1,13 +1,17 @@
 """Bodies that move, their coordinates, and where these put them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from polycorner import checks
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.shapes import Body
+from polycorner.bodies.shapes import Body, Turn, turning
+from polycorner.checks import refuse
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
@@ -99,12 +103,13 @@ class Placement(Value):
         """Return the body in its place."""
         return self.body.carried(*self.pose(q))
 
-    def directions(self, q: Array) -> Array:
-        """Return vectors ``(k, d)`` that show how the body is turned."""
-        if self.frame is Frame.SHIFTED or self.is_round:
+    def directions(self, q: Array, *, whole: bool = False) -> Array:
+        """Return vectors ``(k, d)`` that show how the body, or ``whole`` all of it, is turned."""
+        whole = whole and self.frame is not Frame.AXIAL
+        if self.frame is Frame.SHIFTED or (self.is_round and not whole):
             return np.empty((0, self.body.dimension))
         _, matrix = self.pose(q)
-        return (matrix @ self.axis)[None] if self.revolves else matrix.T
+        return (matrix @ self.axis)[None] if self.revolves and not whole else matrix.T
 
 
 def frame_of(body: Body, orientations: str) -> Frame:
@@ -117,6 +122,64 @@ def frame_of(body: Body, orientations: str) -> Frame:
         if body.dimension == 3:
             return Frame.AXIAL
     return Frame.TURNED if body.dimension == 2 else Frame.ROTATED
+
+
+def pose_of(argument: str, given: Any, d: int) -> tuple[Array, Array]:
+    """Return origin and matrix of what a user gives for a placement."""
+    turn: Turn | None = None
+    expected = f"{d} numbers, or a pair of them and a rotation"
+    if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
+        given, turn = given
+    origin = checks.numbers(argument, given, expected)
+    if origin.shape != (d,):
+        refuse(argument, expected, given)
+    return origin, turning(turn, d)
+
+
+def coordinates(placed: Any, placements: Sequence[Placement]) -> Array:
+    """Return the coordinates of all bodies where a user places them."""
+    names = [p.name for p in placements]
+    checks.names("placed", checks.mapping("placed", placed), names)
+    missing = [name for name in names if name not in placed]
+    if missing:
+        refuse("placed", f"a placement of {missing[0]!r} as well", [*placed])
+    found = []
+    for p in placements:
+        origin, matrix = pose_of("placed", placed[p.name], p.body.dimension)
+        fixed = p.frame is Frame.SHIFTED and not p.is_round
+        if fixed and (matrix != np.eye(len(origin))).any():
+            expected = f"no rotation of {p.name!r}, which is shifted only"
+            refuse("placed", expected, placed[p.name])
+        found.append(p.coordinates(origin, matrix))
+    return np.concatenate(found)
+
+
+def rates(point: Array, moving: Any, placements: Sequence[Placement]) -> Array:
+    """Return the velocities of the coordinates of all bodies, which a user sets in motion."""
+    checks.names("moving", checks.mapping("moving", moving), [p.name for p in placements])
+    found = [p.rates(point, *_motion(moving.get(p.name), p)) for p in placements]
+    return np.concatenate(found)
+
+
+def _motion(given: Any, p: Placement) -> tuple[Array, Array]:
+    """Return velocity ``(d,)`` and angular velocity ``(3,)`` of what a user gives for a motion."""
+    d = p.body.dimension
+    spins = "a number" if d == 2 else "3 numbers"
+    expected = f"{d} finite numbers for {p.name!r}, or a pair of them and {spins}"
+    if given is None:
+        return np.zeros(d), np.zeros(3)
+    turn: Any = np.zeros(3)
+    if isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1:
+        given, turn = given
+        turn = checks.numbers("moving", turn, expected)
+        turn = np.array([0.0, 0.0, turn]) if d == 2 and turn.ndim == 0 else turn
+    velocity = checks.numbers("moving", given, expected)
+    fits = velocity.shape == (d,) and turn.shape == (3,)
+    if not fits or not np.isfinite([*velocity, *turn]).all():
+        refuse("moving", expected, given)
+    if turn.any() and p.frame is Frame.SHIFTED:
+        refuse("moving", f"no angular velocity of {p.name!r}, which is shifted only", turn)
+    return velocity, turn
 
 
 def _carrying(a: Array, b: Array) -> Array:

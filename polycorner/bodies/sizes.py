@@ -101,7 +101,9 @@ def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True)
     t = manifold.symbols[-1]
     least = min(radii.values())
     limits = SmoothFunction(FULL, t, manifold), SmoothFunction(THIN, least - t, manifold)
-    return Polyhedron(manifold, AllOf(*together(gaps), *limits))
+    held = [SmoothFunction(*one, manifold) for one in arrangement.mechanism.limits.items()]
+    parts = AllOf(*together(gaps), *held, *limits)
+    return Polyhedron(manifold, parts, arrangement.mechanism.equations)
 
 
 @checked
@@ -143,7 +145,8 @@ def scaled(
     >>> float(best.point[-1].round(9)), best.verdict.name
     (0.5, 'MINIMUM_ALONG_LOCUS')
     """
-    instance("arrangement", arrangement, Arrangement)
+    if instance("arrangement", arrangement, Arrangement).joints:
+        refuse("arrangement", "one without joints, whose anchors would move", arrangement.joints)
     least = checks.real("least", least, above=0, below=1)
     unit = arrangement.scale / max(body.size for body in arrangement.named.values())
     with about("name"):

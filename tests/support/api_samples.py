@@ -2,6 +2,7 @@
 
 import math
 import tempfile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -203,6 +204,11 @@ hexagon = cache(
 arrangement = cache(
     lambda: bodies.Arrangement(
         {"a": bodies.disc(1.0), "b": bodies.disc(0.5)}, walls=bodies.box([-5, -5], [5, 5])
+    )
+)
+guided = cache(
+    lambda: replace(
+        arrangement(), joints={"rail": bodies.Rail("world", "b", at=[3.0, 0.0], axis=[1.0, 0.0])}
     )
 )
 lying = cache(lambda: dumbbells.RigidDumbbells(drum()).state(PLACED))

@@ -1,0 +1,207 @@
+"""Mechanisms: bodies with joints, as formulas, and their placements by angles and positions."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from polycorner import checks
+from polycorner.bodies import constraints
+from polycorner.bodies.constraints import check_fit, geared, has_coordinate, inequalities, relative
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.holds import Coordinate, Hold
+from polycorner.bodies.joints import WORLD, AnyJoint, Gear, Joint
+from polycorner.bodies.poses import Placement, pose_of
+from polycorner.bodies.shapes import Body
+from polycorner.checks import about, refuse
+from polycorner.formulas.families import Family
+from polycorner.motion.placements import onto_equations
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import DEFAULT
+from polycorner.values import Checked
+
+if TYPE_CHECKING:
+    from polycorner.bodies.holds import Expressions
+
+
+def check_joints(
+    joints: Mapping[str, Any], bodies: Mapping[str, Body], fixed: Mapping[str, Body]
+) -> None:
+    """Raise for joints that do not fit the bodies."""
+    able = [name for name, joint in joints.items() if has_coordinate(joint)]
+    for name, joint in joints.items():
+        if not isinstance(name, str) or not name or set(".-") & set(name):
+            refuse("joints", "names without '.' and '-'", name)
+        with about(f"joints[{name!r}]"):
+            if not isinstance(joint, Joint | Gear):
+                expected = "a Hinge, Slider, Ball, Fixed, Rail, Planar or Gear"
+                refuse("joint", expected, joint, TypeError)
+            if isinstance(joint, Gear):
+                checks.names("first", [joint.first], able)
+                checks.names("second", [joint.second], able)
+                continue
+            checks.names("parent", [joint.parent], [WORLD, *bodies, *fixed])
+            checks.names("child", [joint.child], bodies)
+            check_fit(joint, bodies[joint.child].dimension)
+    if joints and WORLD in bodies:
+        refuse("bodies", f"names other than {WORLD!r} where there are joints", WORLD)
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism(Checked):
+    """The joints of bodies with coordinates, as formulas.
+
+    Attributes
+    ----------
+    joints : mapping from str to Joint or Gear
+    placements : tuple of Placement
+    """
+
+    joints: Mapping[str, AnyJoint]
+    placements: tuple[Placement, ...]
+
+    def hold(self, name: str) -> Hold:
+        """Return what joints take hold of by a name; that of no body that moves is space."""
+        d = self.placements[0].body.dimension
+        found = (p for p in self.placements if p.name == name)
+        bodies = (Hold(name, p.frame, d, p.body.axis) for p in found)
+        return next(bodies, Hold(name, Frame.FIXED, d, None))
+
+    def sides(self, joint: Joint) -> tuple[Hold, Hold]:
+        """Return what a joint takes hold of."""
+        return self.hold(joint.parent), self.hold(joint.child)
+
+    def coordinate(self, name: str, argument: str = "joints") -> Coordinate:
+        """Return the coordinate of a joint, or raise ValueError for one that has none."""
+        checks.names(argument, [name], self.joints)
+        joint = self.joints[name]
+        if not (isinstance(joint, Joint) and has_coordinate(joint)):
+            able = "a hinge, a slider or a straight rail, which have one coordinate"
+            refuse(argument, able, name)
+        return constraints.coordinate(joint, *self.sides(joint))
+
+    @property
+    def equations(self) -> "Expressions":
+        """All equations by name."""
+        found: Expressions = {}
+        for name, joint in self.joints.items():
+            if isinstance(joint, Gear):
+                with about(f"joints[{name!r}]"):
+                    both = (self.coordinate(one) for one in (joint.first, joint.second))
+                    found[name] = geared(joint, *both)
+                continue
+            some = constraints.equations(joint, *self.sides(joint))
+            found |= {f"{name}.{end}": e for end, e in some.items()}
+        return found
+
+    @property
+    def limits(self) -> "Expressions":
+        """The inequalities of all limits by name."""
+        found: Expressions = {}
+        for name, joint in self.joints.items():
+            limits = getattr(joint, "limits", None)
+            if limits is None:
+                continue
+            some = inequalities(self.coordinate(name), *limits)
+            found |= {f"{name}.{end}": e for end, e in some.items()}
+        return found
+
+    def values(self, manifold: Manifold, points: Array) -> dict[str, Array]:
+        """Return the coordinates of all joints that have one, ``(...)`` at points ``(..., N)``."""
+        found = {}
+        for name in filter(lambda name: has_coordinate(self.joints[name]), self.joints):
+            family = Family.of({name: self.coordinate(name).value()}, manifold.names)
+            found[name] = family.evaluate(points)[0][..., 0]
+        return found
+
+    @property
+    def apart(self) -> frozenset[frozenset[str]]:
+        """The pairs of bodies that do not touch, for a joint connects them."""
+        return frozenset(
+            frozenset(joint.bodies)
+            for joint in self.joints.values()
+            if isinstance(joint, Joint) and not joint.collide
+        )
+
+
+def completed(
+    mechanism: Mechanism,
+    placed: Any,
+    values: Mapping[str, Any],
+    fixed: Mapping[str, Body],
+) -> dict[str, Any]:
+    """Return placements with those of bodies that joints connect with bodies which have one.
+
+    Joints with a value come first; others are where their coordinate is zero.
+    """
+    given = dict(checks.mapping("placed", placed))
+    joints = {name: j for name, j in mechanism.joints.items() if isinstance(j, Joint)}
+    checks.names("joints", checks.mapping("joints", values), joints)
+    if not joints:
+        return given
+    d = mechanism.placements[0].body.dimension
+    poses = dict.fromkeys((WORLD, *fixed), (np.zeros(d), np.eye(d)))
+    bodies = [p.name for p in mechanism.placements]
+    poses |= {n: pose_of("placed", one, d) for n, one in given.items() if n in bodies}
+    waiting = sorted(joints, key=lambda name: name not in values)
+    while name := next((n for n in waiting if 0 < _known(joints[n], poses) < 2), None):
+        joint = joints[name]
+        with about(f"joints[{name!r}]"):
+            away, turn = relative(joint, values.get(name, 0.0), d)
+        if joint.parent in poses:
+            origin, matrix = poses[joint.parent]
+            poses[joint.child] = origin + matrix @ away, matrix @ turn
+        else:
+            origin, matrix = poses[joint.child]
+            whole = matrix @ turn.T
+            poses[joint.parent] = origin - whole @ away, whole
+    for name in bodies:
+        if name not in given and name in poses:
+            origin, matrix = poses[name]
+            angle = math.atan2(matrix[1, 0], matrix[0, 0])
+            given[name] = origin, angle if d == 2 else Rotation.from_matrix(matrix)
+    return given
+
+
+def _known(joint: Joint, poses: Mapping[str, Any]) -> int:
+    return sum(side in poses for side in joint.bodies)
+
+
+def closed(polyhedron: Polyhedron, q: Array) -> Array:
+    """Return the nearest point at which equations hold, or raise ValueError."""
+    with np.errstate(all="ignore"):
+        found = onto_equations(polyhedron, q)
+    off = polyhedron.equation_values(found)
+    if not np.isfinite(off).all() or abs(off).max() > DEFAULT.same * (1 + abs(found).max()):
+        worst = int(np.argmax(np.where(np.isfinite(off), abs(off), np.inf)))
+        expected = "placements near ones in which all joints hold"
+        refuse("placed", f"{expected}, also {polyhedron.equation_names[worst]!r}", q.tolist())
+    return found
+
+
+def moved_along(
+    polyhedron: Polyhedron,
+    mechanism: Mechanism,
+    q: Array,
+    v: Array,
+    rates: Mapping[str, float],
+) -> Array:
+    """Return the velocities nearest to given ones along equations, with given rates of joints."""
+    manifold = polyhedron.manifold
+    families = {name: mechanism.coordinate(name).value() for name in rates}
+    wanted = np.array([checks.real("joints", rate) for rate in rates.values()])
+    rows = polyhedron.bundle.evaluate(q, 1)[1][len(polyhedron.functions) :]
+    if families:
+        own = Family.of(families, manifold.names).evaluate(q, order=1)[1]
+        rows = np.vstack([rows, own])
+    scaled = rows * manifold.scale_array
+    target = np.concatenate([np.zeros(len(rows) - len(wanted)), wanted]) - rows @ v
+    step, *_ = np.linalg.lstsq(scaled, target, rcond=DEFAULT.rank)
+    missed = abs(scaled @ step - target).max(initial=0.0)
+    if missed > DEFAULT.same * (1 + abs(target).max(initial=0.0)):
+        refuse("joints", "rates that are possible together", dict(rates))
+    return np.asarray(v + manifold.scale_array * step)
