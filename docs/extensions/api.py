@@ -169,6 +169,11 @@ GROUPS = (
         },
     ),
     Group(
+        "Read what other programs write",
+        "Bodies from meshes.",
+        {"files": "read_mesh Solid MeshOptions"},
+    ),
+    Group(
         "Run a parameter study",
         "A function on a grid, on any number of workers, in a store that grows.",
         {

@@ -58,17 +58,44 @@ def _plane(points: Array) -> Facets:
 
 
 def _space(points: Array) -> Facets:
-    size = float(np.ptp(points, axis=0).max())
-    normals: list[Array] = []
-    members: list[tuple[int, ...]] = []
-    for plane in ConvexHull(points).equations:
-        normal = plane[:3]
-        height = points @ normal
-        on = tuple(np.flatnonzero(height >= height.max() - DEFAULT.alike * size).tolist())
-        # Qhull divides faces into triangles; those of one face have its vertices.
-        if on not in members:
-            members.append(on)
-            normals.append(normal)
+    """Return faces of a polyhedron: triangles of Qhull, joined with the next ones in their plane.
+
+    Two triangles are in one plane if neither's last corner is off the plane of the other.  They
+    are compared side by side, so that faces that are nearly flat are divided one way or another.
+    """
+    hull, size = ConvexHull(points), float(np.ptp(points, axis=0).max())
+    heights = hull.equations[:, :3] @ points.T + hull.equations[:, 3:]
+    heights -= heights.max(axis=1, keepdims=True)
+    first = list(range(len(heights)))  # of the triangles of a face the one with the least number
+
+    def root(k: int) -> int:
+        while first[k] != k:
+            k = first[k]
+        return k
+
+    for k, beside in enumerate(hull.neighbors.tolist()):
+        for other in beside:
+            off = min(
+                heights[k][hull.simplices[other]].min(), heights[other][hull.simplices[k]].min()
+            )
+            if off >= -DEFAULT.alike * size:
+                first[max(root(k), root(other))] = min(root(k), root(other))
+    roots = [root(k) for k in range(len(heights))]
+    starts = [*dict.fromkeys(roots)]
+    normals = hull.equations[starts, :3]
+    members = [
+        tuple(
+            sorted(
+                {
+                    i
+                    for k, t in zip(roots, hull.simplices.tolist(), strict=True)
+                    if k == s
+                    for i in t
+                }
+            )
+        )
+        for s in starts
+    ]
     faces = tuple(map(_round, members, normals, [points] * len(members)))
     left = {way: k for k, face in enumerate(faces) for way in pairwise((*face, face[0]))}
     edges = tuple((i, j, k, left[j, i]) for (i, j), k in left.items() if i < j)

@@ -1,18 +1,22 @@
 from .certificates import load_certificate, save_certificate
 from .graphs import load_graph, save_graph, skeleton_graph
 from .landscapes import load_landscape, save_landscape
+from .meshes import MeshOptions, Solid, read_mesh
 from .problems import ProblemFile, load_problem, save_problem
 from .skeletons import load_skeleton, save_skeleton
 from .trajectories import load_trajectory, save_trajectory
 
 __all__ = [
+    "MeshOptions",
     "ProblemFile",
+    "Solid",
     "load_certificate",
     "load_graph",
     "load_landscape",
     "load_problem",
     "load_skeleton",
     "load_trajectory",
+    "read_mesh",
     "save_certificate",
     "save_graph",
     "save_landscape",

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from itertools import product
 
 import numpy as np
 import pytest
@@ -166,3 +167,16 @@ def test_the_axis_leads_to_the_first_of_points_as_far_but_for_rounding(length):
     """Which of two ends is the farther by the last bit says nothing."""
     rod = capsule([0, 0, -1.5], [0, 0, length], 0.2)
     assert np.allclose(rod.axis, [0, 0, -1], rtol=0, atol=1e-14)
+
+
+@given(st.integers(0, 10**6), st.sampled_from([0.0, 1e-10, 1e-9, 2e-9, 1e-8, 1e-7]))
+def test_faces_that_are_almost_flat_have_edges_of_two_faces(seed, noise):
+    rng = np.random.default_rng(seed)
+    corners = np.array(list(product((-1.0, 1.0), repeat=3))) @ Rotation.random(rng=rng).as_matrix()
+    part = polytope(corners + noise * rng.uniform(-1, 1, corners.shape)).parts[""]
+    faces = [set(face) for face in part.facets.faces]
+    assert 6 <= len(faces) <= 12
+    assert 8 - len(part.facets.edges) + len(faces) == 2  # Euler
+    for i, j, left, right in part.facets.edges:
+        assert {i, j} <= faces[left]
+        assert {i, j} <= faces[right]

@@ -173,6 +173,13 @@ def problem_file():
 
 
 @cache
+def mesh_file():
+    path = new("corner.obj")
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    return path
+
+
+@cache
 def study_file():
     path = new("study.toml")
     path.write_text('study = "area"\n[axes.size]\nvalues = [1.0]\n')

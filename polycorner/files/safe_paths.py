@@ -1,0 +1,53 @@
+"""Files that others wrote: of bounded size, and within a folder."""
+
+import os
+from pathlib import Path
+
+from polycorner.checks import refuse
+
+MIB = 2**20
+
+
+def content(argument: str, path: str | os.PathLike[str], megabytes: float) -> bytes:
+    """Return the bytes of a file.
+
+    Raises
+    ------
+    ValueError
+        For one that is larger than ``megabytes``, in MiB, or is no ordinary file.
+    OSError
+        If it cannot be read.
+    """
+    most = int(MIB * megabytes)
+    with Path(path).open("rb") as file:
+        if not Path(path).is_file():
+            refuse(argument, "an ordinary file", os.fspath(path))
+        found = file.read(most + 1)
+    if len(found) > most:
+        refuse(f"{argument}: {name_of(path)}", f"at most {megabytes:g} MiB", "more")
+    return found
+
+
+def name_of(path: str | os.PathLike[str]) -> str:
+    """Return the last part of a path, for messages."""
+    return Path(path).name
+
+
+def within(argument: str, folder: Path, reference: str) -> Path:
+    """Return the file that another file refers to, by a path in a folder, links followed.
+
+    Raises
+    ------
+    ValueError
+        For an absolute path, a URI, and what leads out of the folder.
+    """
+    expected = f"the path of a file in the folder {folder}"
+    place = Path(reference)
+    strange = "\0" in reference or "\\" in reference or ":" in reference
+    if not reference or strange or place.is_absolute():
+        refuse(argument, expected, reference)
+    root = folder.resolve()
+    found = (root / place).resolve()
+    if not found.is_relative_to(root):
+        refuse(argument, f"{expected}, without a way out of it", reference)
+    return found
