@@ -327,7 +327,8 @@ class Arrangement(Checked):
         Raises
         ------
         NotImplementedError
-            For two sharp polygons or polyhedra, and for rolling that is not covered.
+            For two sharp polygons or polyhedra that are listed or fixed, and for rolling that is
+            not covered.
 
         Examples
         --------

@@ -16,15 +16,16 @@ from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.laws import Both, Laws
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.neighbours import pairs
-from polycorner.bodies.pairs import PlacedPart, Touch, distances
+from polycorner.bodies.pairs import PlacedPart, Touch, distances, members
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import carried, turned
+from polycorner.bodies.shapes import Part
 from polycorner.bodies.slips import ROLLING, SLIDING, AtWall, slips_at_wall, slips_of
 from polycorner.checks import refuse
 from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.fusion import written_out
-from polycorner.motion.bodies import RUBBING
+from polycorner.motion.bodies import RUBBING, PairLaw
 from polycorner.motion.contacts import (
     PAIR,
     ContactFamily,
@@ -36,6 +37,8 @@ from polycorner.motion.contacts import (
 )
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.friction import Disc, Interval
+from polycorner.motion.hulls.contacts import Hull, HullContacts
+from polycorner.motion.noise import OPTIONS
 from polycorner.motion.rotations import rotational_energy
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
     import sympy
 
 NONE = (0.0, 0.0)  # no friction
+MOST_VERTICES = 64  # of a sharp part that moves: two of them have 35,000 pairs of edges
 
 
 def masses_of(placements: tuple[Placement, ...], density: float, given: Any) -> dict[str, Mass]:
@@ -250,12 +254,14 @@ def _check_turning(argument: str, rubbing: list[PlacedPart], given: Any) -> None
             refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
-def between(p: Placement, lattice: Lattice, known: Laws) -> ContactFamily:
+def between(p: Placement, lattice: Lattice, known: Laws) -> ContactFamily | HullContacts:
     """Return the contacts of any two of several bodies like one, by the laws of a pair of it.
 
     The two are called after the body, with 1 and 2, and so are their coordinates.  In a periodic
     box the second is the nearest image.
     """
+    if all(is_sharp(part) for part in p.body.parts.values()):
+        return between_hulls(p, lattice, known)
     pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
     space = pair[0].manifold * pair[1].manifold
     meeting = pairs(lattice, tuple(pair), {})
@@ -284,6 +290,56 @@ def between(p: Placement, lattice: Lattice, known: Laws) -> ContactFamily:
     )
 
 
+def is_sharp(part: Part) -> bool:
+    """Whether a part is a polygon or polyhedron that is not rounded."""
+    return part.radius == 0
+
+
+def between_hulls(p: Placement, lattice: Lattice, known: Laws) -> HullContacts:
+    """Return the contacts of any two of several bodies like one whose parts are all sharp."""
+    name = f"{p.name}-{p.name}"
+    if known.rolling.get(name, NONE)[0]:
+        msg = (
+            f"rolling: expected 0 between sharp polygons or polyhedra, which roll on no radius; "
+            f"got {known.rolling[name]}"
+        )
+        raise NotImplementedError(msg)
+    static, dynamic = known.friction.get(name, NONE)
+    d, scale = p.body.dimension, p.manifold.scales[0]
+    laws = ()
+    if static:
+        one, *_ = members(p.name, p.body, p)
+        _check_turning("friction", [one], static)
+        laws = (PairLaw(d - 1, _set(static, d), _set(dynamic, d)),)
+    one, two = (
+        [_hull(f"{p.name}{k}", name, part) for name, part in p.body.parts.items()] for k in PAIR
+    )
+    return HullContacts(
+        [(first, second) for first in one for second in two],
+        (p.manifold.size,) * 2,
+        OPTIONS.touching * scale,
+        lattice.lengths.tolist(),
+        2 * p.body.size / scale,
+        p.manifold.names[:2],
+        laws,
+        known.restitution.get(name, 0.0),
+    )
+
+
+def _hull(body: str, name: str, part: Part) -> Hull:
+    """Return a sharp part with the numbers that the compiled code needs."""
+    facets, label = part.facets, f"{body}.{name}" if name else body
+    if len(part.points) > MOST_VERTICES:
+        refuse(
+            "bodies",
+            f"at most {MOST_VERTICES} vertices of a sharp part that moves, since its "
+            f"contacts are as many as pairs of edges",
+            f"{len(part.points)} of {label!r}",
+        )
+    on = np.array([face[0] for face in facets.faces])
+    return Hull(label, part.points, facets.normals, on, facets.edges)
+
+
 def _renamed(p: Placement, name: str) -> Manifold:
     """Return the manifold of a body of another name."""
     named = p.frame.manifold(name, p.body.dimension, 1.0, 1.0, "")
@@ -294,8 +350,9 @@ def smooth(polyhedron: Polyhedron) -> Polyhedron:
     """Return the polyhedron, or raise where motion would need a union."""
     if polyhedron.is_union:
         msg = (
-            "bodies: expected rounded bodies (radius > 0) for motion; two sharp polygons or "
-            "polyhedra are apart in one of several ways, which is not covered"
+            "bodies: expected rounded bodies (radius > 0), or one sharp body that is repeated "
+            "(count=); other sharp polygons or polyhedra are apart in one of several ways, of "
+            "which motion chooses none"
         )
         raise NotImplementedError(msg)
     return polyhedron

@@ -25,6 +25,7 @@ from polycorner.files.motions import (
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
+from polycorner.motion.contacts import ContactFamily
 from polycorner.motion.system import System
 from polycorner.motion.trajectory import Trajectory
 
@@ -191,17 +192,20 @@ def _told(system: System) -> dict[str, Any]:
         "gaps": {f.name: [text(f.expression), *f.parameters] for f in polyhedron.functions},
         "equations": {h.name: [text(h.expression), *h.parameters] for h in polyhedron.stated},
     }
-    between = system.between and {
-        "gaps": {name: text(gap) for name, gap in system.between.gaps.items()},
-        "friction": [
-            [
-                {name: [*map(_slip, slip)] for name, slip in law.slip.items()},
-                f"{law.static}, {law.moving}",
-            ]
-            for law in system.between.friction
-        ],
-        "restitution": system.between.restitution,
-    }
+    family = system.between
+    between = family and family.described()
+    if isinstance(family, ContactFamily):
+        between = {
+            "gaps": {name: text(gap) for name, gap in family.gaps.items()},
+            "friction": [
+                [
+                    {name: [*map(_slip, slip)] for name, slip in law.slip.items()},
+                    f"{law.static}, {law.moving}",
+                ]
+                for law in family.friction
+            ],
+            "restitution": family.restitution,
+        }
     return told | {"count": system.count, "between": between}
 
 

@@ -88,14 +88,25 @@ class Shipped:
         write_atomically(self.path, lzma.compress((self.head + self.make()).encode(), preset=9))
 
     @cached_property
-    def functions(self) -> tuple[Function, ...]:
-        """The functions; of several processes one compiles them, and the others wait."""
+    def _code(self) -> tuple[Any, list[int]]:
+        """What holds the machine code; of several processes one compiles it, and others wait."""
         head = self.head
         key = repr((head, self.file, machine_key()))
         name = f"{self.file.partition('.')[0]}_{hashlib.sha256(key.encode()).hexdigest()[:32]}"
         turn = one_at_a_time(name) if read_code(name) is None else nullcontext()
         with turn:
             holder, addresses, _ = kept_code(name, list(self.names), lambda: self._made(head))
+        return holder, addresses
+
+    @property
+    def addresses(self) -> list[int]:
+        """The addresses of the functions, for callers in machine code."""
+        return self._code[1]
+
+    @cached_property
+    def functions(self) -> tuple[Function, ...]:
+        """The functions."""
+        holder, addresses = self._code
         return tuple(self._function(address, holder) for address in addresses)
 
     def _made(self, head: str) -> bytes:

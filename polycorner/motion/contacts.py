@@ -319,7 +319,7 @@ class ContactFamily(Checked):
 
 def position_of(
     manifold: Manifold,
-    between: ContactFamily | None,
+    between: Any,
     substrate: Mapping[str, float],
     *,
     several: bool,

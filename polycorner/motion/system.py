@@ -15,6 +15,7 @@ from polycorner.kinds import check_fields, checked
 from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
 from polycorner.motion.contacts import ContactFamily, Friction, position_of, slip_text
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
+from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import OPTIONS
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
@@ -112,7 +113,7 @@ class System(MechanicalSystem):
     friction: tuple[Friction, ...] = ()
     restitution: float | Mapping[str, float] = 0.0
     count: int = 1
-    between: ContactFamily | None = None
+    between: ContactFamily | HullContacts | None = None
     substrate: Mapping[str, float] = field(default_factory=dict)
     exits: Mapping[str, float] = field(default_factory=dict)
 

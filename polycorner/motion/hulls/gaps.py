@@ -1,0 +1,241 @@
+"""Gaps and slips of two bodies of sharp hulls, called as kernels of formulas are.
+
+Contacts of two parts are the vertices of the second at the first, those of the first at the second,
+and in space every edge of the first with every edge of the second.
+
+The *gap* of a vertex is its greatest height over the faces of the other part: negative inside, and
+outside a bound of the distance that vanishes with it.  That of two edges is the distance of the
+points where they cross, seen along the normal of the plane between the parts, or by how much they
+miss each other there, if that is more.  So gaps are continuous as long as the plane is the same,
+and none is small where nothing touches.  All close and slip along the one plane between the parts
+(:mod:`~polycorner.motion.hulls.planes`), at the point of the vertex or edge.  Where parts overlap
+the contact of the plane itself, a face and the vertex that is deepest or two edges, has the height
+of the plane, so that no overlap is without a contact.
+
+Rows: in the plane, velocities that keep both ends of the overlap of two parallel faces from closing
+keep all of it from closing, since the velocity along the normal is affine on it.  In space the
+overlap of two faces is a polygon whose corners are vertices of one over the other and crossings of
+edges.
+"""
+
+import numpy as np
+
+from polycorner.motion.hulls.geometry import (
+    DIMENSION,
+    EDGES,
+    FACES,
+    HEAD,
+    ONE,
+    PAIR,
+    PAIRS,
+    PERIODS,
+    THICKNESS,
+    TWO,
+    VERTICES,
+    ZERO_HEIGHT,
+    add_motion,
+    back,
+    beyond,
+    cross,
+    dot,
+    edge_at,
+    face_at,
+    place,
+    relative,
+    scaled,
+    triple,
+    turned,
+    vertex_at,
+    whole,
+)
+from polycorner.motion.hulls.memory import compiled, get, put
+from polycorner.motion.hulls.planes import BOTH, FIRST, SECOND, plane_between
+
+
+@compiled
+def places(q, table):
+    """Return where both bodies are, of the second the image that is nearest to the first."""
+    d, one, two = whole(table, DIMENSION), whole(table, ONE), whole(table, TWO)
+    m, c = place(q, np.int64(0), one, d)
+    n, e = place(q, one, two, d)
+    x, y, z = e
+    period = triple(table, PERIODS)
+    if period[0] > 0.0:
+        x -= period[0] * np.floor((x - c[0]) / period[0] + 0.5)
+    if period[1] > 0.0:
+        y -= period[1] * np.floor((y - c[1]) / period[1] + 0.5)
+    if period[2] > 0.0:
+        z -= period[2] * np.floor((z - c[2]) / period[2] + 0.5)
+    return m, n, relative(m, n), back(m, beyond((x, y, z), -1.0, c))
+
+
+@compiled
+def parts_of(table, s):
+    """Return where both parts of a pair of parts are in a table, and their first contact."""
+    at = HEAD + PAIR * s
+    return whole(table, at), whole(table, at + 1), whole(table, at + 2)
+
+
+@compiled
+def greatest_height(table, part, x):
+    """Return the greatest height of a point over the faces of a part, in its coordinates."""
+    most = -np.inf
+    for f in range(whole(table, part + FACES)):
+        at = face_at(table, part, f)
+        most = max(most, dot(triple(table, at), x) - get(table, at + 3))
+    return most
+
+
+@compiled
+def faces_along(table, at, normal):
+    """Return whether a face beside an edge faces along a direction."""
+    return max(dot(triple(table, at + 6), normal), dot(triple(table, at + 9), normal)) > 0.0
+
+
+@compiled
+def edge_gap(p, u, q, v, normal, zero):
+    """Return the gap of two edges, and where the first meets the second, from 0 to 1."""
+    w, r = cross(u, v), beyond(q, -1.0, p)
+    size, uu, vv = dot(w, normal), dot(u, u), dot(v, v)
+    # Edges that are parallel, as seen along the normal, meet in their ends, which are vertices.
+    if size * size <= zero * zero * max(uu, vv):
+        return np.inf, 0.0
+    s, t = dot(cross(r, v), normal) / size, dot(cross(r, u), normal) / size
+    missed = abs(size) * max(max(-s, s - 1.0) / np.sqrt(vv), max(-t, t - 1.0) / np.sqrt(uu))
+    return max(dot(r, w) / size, missed), min(max(s, 0.0), 1.0)
+
+
+@compiled
+def add_row(q, table, here, along, x, row, first):
+    """Write how a contact at a point of the first body's coordinates opens along a direction."""
+    m, n, r, t = here
+    d, one, two = whole(table, DIMENSION), whole(table, ONE), whole(table, TWO)
+    add_motion(q, np.int64(0), one, d, m, x, along, -1.0, row, first)
+    local = back(r, beyond(x, -1.0, t))
+    add_motion(q, one, two, d, n, local, along, 1.0, row, first + one)
+
+
+@compiled
+def evaluate_parts(q, table, here, s, f, J, slopes):
+    """Write the gaps of two parts and, if asked for, their gradients."""
+    m, _, r, t = here
+    one, two, g = parts_of(table, s)
+    width = whole(table, ONE) + whole(table, TWO)
+    height, normal, kind, i, j = plane_between(table, one, two, r, t)
+    along = turned(m, normal)
+    for v in range(whole(table, two + VERTICES)):
+        x = beyond(turned(r, triple(table, vertex_at(two, v))), 1.0, t)
+        gap = greatest_height(table, one, x)
+        if height < 0.0 and kind == FIRST and v == j:
+            gap = min(gap, height)
+        put(f, g, gap)
+        if slopes:
+            add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
+        g += 1
+    for v in range(whole(table, one + VERTICES)):
+        x = triple(table, vertex_at(one, v))
+        gap = greatest_height(table, two, back(r, beyond(x, -1.0, t)))
+        if height < 0.0 and kind == SECOND and v == j:
+            gap = min(gap, height)
+        put(f, g, gap)
+        if slopes:
+            add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
+        g += 1
+    thickness = min(get(table, one + THICKNESS), get(table, two + THICKNESS))
+    far = height > thickness
+    # Finite where curvature is measured: a contact that acts may be none at the next midpoint.
+    none = np.inf if slopes else thickness + max(height, 0.0)
+    edges, others = whole(table, one + EDGES), whole(table, two + EDGES)
+    inward = scaled(-1.0, back(r, normal))
+    for b in range(others):
+        at = edge_at(table, two, b)
+        other = not far and faces_along(table, at, inward)
+        y, v = beyond(turned(r, triple(table, at)), 1.0, t), turned(r, triple(table, at + 3))
+        for a in range(edges):
+            at, slot, gap, meets = edge_at(table, one, a), g + a * others + b, np.inf, 0.0
+            if other and faces_along(table, at, normal):
+                x, u = triple(table, at), triple(table, at + 3)
+                gap, meets = edge_gap(x, u, y, v, normal, get(table, ZERO_HEIGHT))
+                if height < 0.0 and kind == BOTH and a == i and b == j:
+                    gap = min(gap, height)
+                if slopes and gap < np.inf:
+                    x = beyond(x, meets, u)
+                    add_row(q, table, here, along, x, J + 8 * width * slot, np.int64(0))
+            put(f, slot, min(gap, none))
+
+
+@compiled
+def gaps(q, table, f, J, slopes):
+    """Write the gaps of two bodies, and their gradients if ``slopes`` is not zero."""
+    here = places(q, table)
+    for s in range(whole(table, PAIRS)):
+        evaluate_parts(q, table, here, s, f, J, slopes != 0)
+    return 0
+
+
+@compiled
+def values(q, table, f, J, H):
+    """Write the gaps of two bodies."""
+    return gaps(q, table, f, J, np.int64(0))
+
+
+@compiled
+def gradients(q, table, f, J, H):
+    """Write the gaps of two bodies and their gradients."""
+    return gaps(q, table, f, J, np.int64(1))
+
+
+@compiled
+def point_of(table, here, one, two, normal, g):
+    """Return the point of a contact, by its number among those of two parts."""
+    _, _, r, t = here
+    count, other = whole(table, two + VERTICES), whole(table, one + VERTICES)
+    if g < count:
+        return beyond(turned(r, triple(table, vertex_at(two, g))), 1.0, t)
+    if g < count + other:
+        return triple(table, vertex_at(one, g - count))
+    a, b = divmod(g - count - other, whole(table, two + EDGES))
+    at, there = edge_at(table, one, a), edge_at(table, two, b)
+    x, u = triple(table, at), triple(table, at + 3)
+    y, v = beyond(turned(r, triple(table, there)), 1.0, t), turned(r, triple(table, there + 3))
+    _, meets = edge_gap(x, u, y, v, normal, get(table, ZERO_HEIGHT))
+    return beyond(x, meets, u)
+
+
+@compiled
+def tangent(normal, d, which):
+    """Return a tangent of a normal: in the plane, it turned left; in space as in [Duff]."""
+    x, y, z = normal
+    if d == 2:
+        return -y, x, 0.0
+    side = 1.0 if z >= 0.0 else -1.0
+    a = -1.0 / (side + z)
+    if which == 0:
+        return 1.0 + side * x * x * a, side * x * y * a, -side * x
+    return x * y * a, side + y * y * a, -y
+
+
+@compiled
+def slips(q, entry, f, J, H):
+    """Write the slip velocities at a contact, and their derivatives by velocities.
+
+    The entry of a contact has its number, and by how many numbers the table begins before.
+    """
+    table, g = entry - 8 * whole(entry, 1), whole(entry, 0)
+    s = whole(table, PAIRS) - 1
+    while s > 0 and whole(table, HEAD + PAIR * s + 2) > g:
+        s -= 1
+    one, two, first = parts_of(table, s)
+    here, d = places(q, table), whole(table, DIMENSION)
+    m, _, r, t = here
+    _, normal, _, _, _ = plane_between(table, one, two, r, t)
+    x, n = point_of(table, here, one, two, normal, g - first), turned(m, normal)
+    reads = whole(table, ONE) + whole(table, TWO)
+    for c in range(d - 1):
+        row = J + 8 * 2 * reads * c
+        add_row(q, table, here, tangent(n, d, c), x, row, reads)
+        slip = 0.0
+        for a in range(reads, 2 * reads):
+            slip += get(row, np.int64(a)) * get(q, np.int64(a))
+        put(f, np.int64(c), slip)
+    return 0
