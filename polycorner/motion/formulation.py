@@ -332,17 +332,24 @@ class Moment:
 def moment(formulation: Formulation, parameters: Array, q: Array, v: Array) -> Moment:
     """Evaluate the equations of motion at one point."""
     k = len(formulation.coordinates)
+    mass, rest = mass_and_forces(formulation, parameters, q, v)
     at = np.concatenate([q, v])
-    numbers = np.array([*parameters, 0.0])
-    (values,) = formulation.forces.kernel.at(at, numbers.ctypes.data, 0)
-    mass = np.zeros((k, k))
-    upper = np.triu_indices(k)
-    mass[upper] = values[: len(upper[0])]
-    mass = mass + np.triu(mass, 1).T
-    rest = values[len(upper[0]) :]
     (slips,), (slopes,) = formulation.slip_velocities(parameters, at[None])
     matrix = slopes[:, k:]
     return Moment(mass, rest[:k], rest[k : 2 * k], rest[2 * k :], matrix, slips - matrix @ v)
+
+
+def mass_and_forces(
+    formulation: Formulation, parameters: Array, q: Array, v: Array
+) -> tuple[Array, Array]:
+    """Return the mass matrix, and all forces, applied forces and loads in one vector."""
+    k = len(formulation.coordinates)
+    numbers = np.array([*parameters, 0.0])
+    (values,) = formulation.forces.kernel.at(np.concatenate([q, v]), numbers.ctypes.data, 0)
+    mass = np.zeros((k, k))
+    upper = np.triu_indices(k)
+    mass[upper] = values[: len(upper[0])]
+    return mass + np.triu(mass, 1).T, values[len(upper[0]) :]
 
 
 def energies(
@@ -368,21 +375,22 @@ def highest_square(
     where the forces ``lam_j`` balance the others across the equations; ``equations`` has gradients
     ``(j, k)`` and Hessians ``(j, k, k)``.
     """
-    now = moment(formulation, parameters, q, v)
-    mass, stiffness = now.mass, np.empty((len(scales), len(scales)))
-    if not np.isfinite(now.force).all():
+    k = len(scales)
+    mass, forces = mass_and_forces(formulation, parameters, q, v)
+    force, stiffness = forces[:k], np.empty((k, k))
+    if not np.isfinite(force).all():
         return 0.0  # the first step says what is wrong
     for i, scale in enumerate(scales):
-        change = np.zeros(len(scales))
+        change = np.zeros(k)
         change[i] = 1e-5 * scale
-        forth = moment(formulation, parameters, q + change, v).force
-        back = moment(formulation, parameters, q - change, v).force
-        stiffness[:, i] = -(forth - back) / (2 * change[i])
+        _, forth = mass_and_forces(formulation, parameters, q + change, v)
+        _, back = mass_and_forces(formulation, parameters, q - change, v)
+        stiffness[:, i] = -(forth - back)[:k] / (2 * change[i])
     if not np.isfinite(stiffness).all():
         return 0.0  # at the edge of where the force is defined
     if equations is not None:
         rows, bends = equations
-        answer = np.linalg.solve(mass, np.column_stack([rows.T, now.force]))
+        answer = np.linalg.solve(mass, np.column_stack([rows.T, force]))
         balance = np.linalg.lstsq(rows @ answer[:, :-1], -rows @ answer[:, -1], rcond=None)[0]
         _, sizes, directions = np.linalg.svd(rows * scales)
         rank = int((sizes > 1e-10 * sizes.max(initial=0)).sum())
