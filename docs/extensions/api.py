@@ -127,8 +127,8 @@ GROUPS = (
         "Bodies with contacts, impacts and friction: a system, a start, a trajectory.",
         {
             "": "System State simulate Trajectory",
-            "motion": "step Event EventKind Checkpoint Solver MotionOptions MechanicalSystem "
-            "Accelerations Consistency accelerations",
+            "motion": "Assembly MotionOfKind step Event EventKind Checkpoint Solver MotionOptions "
+            "MechanicalSystem Accelerations Consistency accelerations",
         },
     ),
     Group(

@@ -1,7 +1,7 @@
 """Arrangements: rigid bodies, what stands between them, and their placements without overlap."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from operator import mul
 from typing import TYPE_CHECKING, Any, Literal
@@ -28,10 +28,12 @@ from polycorner.bodies.mechanisms import Mechanism, check_joints, closed, comple
 from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
 from polycorner.bodies.pairs import PlacedPart, Tree, apart, distances, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
+from polycorner.bodies.several import assembly
 from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.motion.assembly import Assembly
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -289,13 +291,14 @@ class Arrangement(Checked):
         rolling: Coefficients = 0.0,
         restitution: Restitution = 0.0,
         exits: Mapping[str, float] | None = None,
-        count: int = 1,
-    ) -> System:
+        count: int | Mapping[str, int] = 1,
+    ) -> System | Assembly:
         """Return the mechanical system of the bodies.
 
         Several bodies are one dense system, with states ``(N,)``.  A single one may be repeated:
         ``count`` bodies like it, with states ``(count, N)``, touch each other as well, and near
-        ones are found by the first two coordinates.  In a periodic box they touch the nearest
+        ones are found by their positions.  So may several, as kinds, each ``count[name]`` times:
+        that is an :class:`~polycorner.motion.Assembly`.  In a periodic box they touch the nearest
         images of each other; it has to be more than twice as wide as they reach.
 
         Parameters
@@ -310,8 +313,8 @@ class Arrangement(Checked):
             Coulomb's coefficient, or a static and a dynamic one; needs ``orientations="all"``.  It
             is for all contacts, or by name: of a contact, ``"A.v1-floor"``, of a pair of what
             touches, ``("A", "floor")`` or ``"A-floor"``, of a wall or fixed body, ``"floor"``, or
-            of a body, ``"A"``.  The first of these that is given holds.  Two bodies whose own
-            values differ need one for the pair.  Contacts among repeated bodies are also called
+            of a body or kind, ``"A"``.  The first of these that is given holds.  Two bodies whose
+            own values differ need one for the pair.  Contacts among repeated bodies are also called
             ``"between"``.
         rolling : the same, optional
             Coefficients of rolling resistance: the torque across the normal is at most
@@ -321,8 +324,8 @@ class Arrangement(Checked):
             As in :class:`~polycorner.System`; names as for ``friction``.
         exits : mapping from str to float, optional
             As in :class:`~polycorner.System`.
-        count : int, optional
-            Default 1.
+        count : int, or mapping from str to int, optional
+            Default 1; of several kinds for each body.
 
         Raises
         ------
@@ -343,8 +346,14 @@ class Arrangement(Checked):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
+        if isinstance(count, Mapping):
+            check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
+            alone = {p: self._alone(p) for p in self.placements}
+            given = {"friction": friction, "rolling": rolling, "restitution": restitution}
+            some = {"masses": masses or {}, "exits": exits or {}}
+            return assembly(alone, count, given, some, gravity=gravity, density=density)
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
-            refuse("count", "1 for several bodies; one body may be repeated", count)
+            refuse("count", "1, or numbers by name, for several bodies", count)
         weights = masses_of(self.placements, density, {} if masses is None else masses)
         laws = energies(self.placements, weights, gravity, self.turning)
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
@@ -355,9 +364,10 @@ class Arrangement(Checked):
         meetings += [Meeting(f"{first.name}-{first.name}", *[first.name] * 2, True)] * (count > 1)
         known = laws_of(friction, rolling, restitution, meetings, self.named)
         if count > 1:
-            check_width(self.lattice, first, [*self.fixed.values()])
-            family = between(first, self.lattice, known)
-        free = count > 1 and self.lattice.axes and not (self.pairs or self.at_walls)
+            check_width(self.lattice, [first.body], [*self.fixed.values()])
+            family = between((first, first), self.lattice, known)
+        single = len(self.placements) == 1
+        free = single and self.lattice.axes and not (self.pairs or self.at_walls)
         lone = own_image(self.lattice, first) if free else {}
         joined = None if lone else self._joined(self.contacts(excluded=False))
         placed = smooth(joined or Polyhedron(self.manifold, lone))
@@ -370,6 +380,12 @@ class Arrangement(Checked):
             between=family,
             exits={} if exits is None else exits,
         )
+
+    def _alone(self, p: Placement) -> "Arrangement":
+        """Return the arrangement of one of the bodies, in the units of all."""
+        one = replace(self, bodies={p.name: p.body})
+        vars(one).update(scale=self.scale, placements=(replace(p, at=slice(0, p.manifold.size)),))
+        return one
 
     @cached_property
     def symmetry(self) -> Symmetry:

@@ -254,21 +254,24 @@ def _check_turning(argument: str, rubbing: list[PlacedPart], given: Any) -> None
             refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
-def between(p: Placement, lattice: Lattice, known: Laws) -> ContactFamily | HullContacts:
-    """Return the contacts of any two of several bodies like one, by the laws of a pair of it.
+def between(
+    placements: tuple[Placement, Placement], lattice: Lattice, known: Laws
+) -> ContactFamily | HullContacts:
+    """Return the contacts of any two bodies like two given ones, by the laws of this pair.
 
-    The two are called after the body, with 1 and 2, and so are their coordinates.  In a periodic
-    box the second is the nearest image.
+    The two, which may be the same, are called after these, with 1 and 2, and so are their
+    coordinates.  In a periodic box the second is the nearest image.
     """
-    if all(is_sharp(part) for part in p.body.parts.values()):
-        return between_hulls(p, lattice, known)
-    pair = [replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}")) for k in PAIR]
+    if all(is_sharp(part) for p in placements for part in p.body.parts.values()):
+        return between_hulls(placements, lattice, known)
+    named = [(p, f"{p.name}{k}") for p, k in zip(placements, PAIR, strict=True)]
+    pair = [replace(p, name=name, manifold=_renamed(p, name)) for p, name in named]
     space = pair[0].manifold * pair[1].manifold
     meeting = pairs(lattice, tuple(pair), {})
     touches = [t for parts in meeting for t in distances(space, *parts)]
     definitions, gaps = written_out({t.gap.name: t.gap for t in touches})
     both, laws = motions(space), []
-    name = f"{p.name}-{p.name}"
+    name = "-".join(p.name for p in placements)
     for argument, given, kind, cause in (
         ("friction", known.friction, SLIDING, RUBBING),
         ("rolling", known.rolling, ROLLING, ROLLING),
@@ -277,13 +280,14 @@ def between(p: Placement, lattice: Lattice, known: Laws) -> ContactFamily | Hull
         if static == 0:
             continue
         _check_turning(argument, [*meeting[0]], static)
-        sets = _set(static, p.body.dimension), _set(dynamic, p.body.dimension)
+        d = pair[0].body.dimension
+        sets = _set(static, d), _set(dynamic, d)
         slips = {t.gap.name: slips_of(both, t, kind) for t in touches}
         laws.append(PairFriction(slips, *sets, cause))
     return ContactFamily(
         gaps,
-        2 * p.body.size / p.manifold.scales[0],
-        p.manifold.names[:2],
+        sum(p.body.size for p in placements) / placements[0].manifold.scales[0],
+        tuple(dict.fromkeys(n for p in placements for n in p.manifold.names[: p.body.dimension])),
         friction=tuple(laws),
         restitution=known.restitution.get(name, 0.0),
         definitions=definitions,
@@ -295,9 +299,11 @@ def is_sharp(part: Part) -> bool:
     return part.radius == 0
 
 
-def between_hulls(p: Placement, lattice: Lattice, known: Laws) -> HullContacts:
-    """Return the contacts of any two of several bodies like one whose parts are all sharp."""
-    name = f"{p.name}-{p.name}"
+def between_hulls(
+    placements: tuple[Placement, Placement], lattice: Lattice, known: Laws
+) -> HullContacts:
+    """Return the contacts of any two bodies like two given ones whose parts are all sharp."""
+    name = "-".join(p.name for p in placements)
     if known.rolling.get(name, NONE)[0]:
         msg = (
             f"rolling: expected 0 between sharp polygons or polyhedra, which roll on no radius; "
@@ -305,22 +311,23 @@ def between_hulls(p: Placement, lattice: Lattice, known: Laws) -> HullContacts:
         )
         raise NotImplementedError(msg)
     static, dynamic = known.friction.get(name, NONE)
-    d, scale = p.body.dimension, p.manifold.scales[0]
+    d, scale = placements[0].body.dimension, placements[0].manifold.scales[0]
     laws = ()
     if static:
-        one, *_ = members(p.name, p.body, p)
-        _check_turning("friction", [one], static)
+        rubbing = [next(iter(members(p.name, p.body, p))) for p in placements]
+        _check_turning("friction", rubbing, static)
         laws = (PairLaw(d - 1, _set(static, d), _set(dynamic, d)),)
     one, two = (
-        [_hull(f"{p.name}{k}", name, part) for name, part in p.body.parts.items()] for k in PAIR
+        [_hull(f"{p.name}{k}", part_name, part) for part_name, part in p.body.parts.items()]
+        for p, k in zip(placements, PAIR, strict=True)
     )
     return HullContacts(
         [(first, second) for first in one for second in two],
-        (p.manifold.size,) * 2,
+        tuple(p.manifold.size for p in placements),
         OPTIONS.touching * scale,
         lattice.lengths.tolist(),
-        2 * p.body.size / scale,
-        p.manifold.names[:2],
+        sum(p.body.size for p in placements) / scale,
+        tuple(dict.fromkeys(n for p in placements for n in p.manifold.names[:d])),
         laws,
         known.restitution.get(name, 0.0),
     )

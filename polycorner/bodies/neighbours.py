@@ -93,9 +93,9 @@ def check_room(
             refuse("period", f"periods in which {p.name!r} does not overlap its image", least)
 
 
-def check_width(lattice: Lattice, p: Placement, fixed: Sequence[Body]) -> None:
-    """Raise ValueError unless only one image can touch: of a body like one, and of a fixed one."""
-    reach, shortest = max(reaches([p.body, p.body], fixed)), float(min(lattice.lengths))
+def check_width(lattice: Lattice, kinds: Sequence[Body], fixed: Sequence[Body]) -> None:
+    """Raise ValueError unless only one image can touch: of bodies like these, and of fixed ones."""
+    reach, shortest = max(reaches([*kinds, *kinds], fixed)), float(min(lattice.lengths))
     if max(lattice.counts(reach)) > 1:
         least = f"lengths of at least {2 * reach / CLEAR:g} for repeated bodies"
         refuse("period", f"{least} that touch up to {reach:g} apart", shortest)

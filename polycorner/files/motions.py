@@ -229,10 +229,10 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         return np.stack(columns, axis=1).astype(np.int64)
 
     def flags(name: str) -> Any:
-        return of(name, T, bodies.count, kind="i", least=0, most=1) != 0
+        return of(name, T, bodies.total, kind="i", least=0, most=1) != 0
 
     for name, array in (("q", q), ("v", v)):
-        forms.array(name, array, "f", (T, bodies.count, bodies.dimension))
+        forms.array(name, array, "f", (T, *bodies.shape))
     times = of("time", T)
     if not T or (np.diff(times) <= 0).any():
         refuse("time", "increasing times", times.tolist())
@@ -252,12 +252,12 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         v=v,
         rests=flags("rests"),
         present=flags("present"),
-        touching=tuple(read_touches(touches, names, T, bodies.count)),
+        touching=tuple(read_touches(touches, names, T, bodies.total)),
         kinetic=of("kinetic", T),
         potential=of("potential", T),
         dissipated=by("dissipated"),
         work=by("work"),
-        events=read_events(events, names, bodies.count),
+        events=read_events(events, names, bodies.total),
         max_penetration=checks.real("max_penetration", at["max_penetration"], least=0),
         effort=Effort(
             **whole,

@@ -1,4 +1,5 @@
 from .accelerations import Accelerations, Consistency, accelerations
+from .assembly import Assembly
 from .checkpoints import Checkpoint
 from .contacts import (
     ContactFamily,
@@ -18,10 +19,11 @@ from .random_functions import random_field, random_signal
 from .rotations import angular_velocity, rotational_energy
 from .simulation import simulate, step
 from .system import System
-from .trajectory import Trajectory
+from .trajectory import MotionOfKind, Trajectory
 
 __all__ = [
     "Accelerations",
+    "Assembly",
     "Checkpoint",
     "Consistency",
     "ContactFamily",
@@ -35,6 +37,7 @@ __all__ = [
     "Friction",
     "Interval",
     "MechanicalSystem",
+    "MotionOfKind",
     "MotionOptions",
     "Noise",
     "PairFriction",

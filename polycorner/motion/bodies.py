@@ -1,16 +1,19 @@
 """Descriptions of bodies and of their contacts: what the engine needs to know of a system."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.families import Family
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import Formulation
+from polycorner.motion.noise import OPTIONS
 from polycorner.spaces.manifold import Array
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 # Causes of dissipation.
 IMPACT = "impact"
@@ -113,7 +116,7 @@ class PairLaw(Value):
 
 @dataclass(frozen=True, eq=False)
 class PairContacts(Value):
-    """The contacts between any two of several identical bodies.
+    """The contacts between any two of several identical bodies, or of two kinds.
 
     Attributes
     ----------
@@ -121,7 +124,7 @@ class PairContacts(Value):
         Gaps of a pair.
     parameters : sequence of float
     reads : tuple of (int, int)
-        For each variable of the gaps the body, 0 or 1, and its coordinate.
+        For each variable of the gaps the body, 0 or 1 (of the second kind), and its coordinate.
     slips : tuple of (Family, bool, sequence of float)
         For each gap the slip velocities at its contact (the rows of all laws; variables: the
         coordinates that the gaps read, then all velocities of both bodies), whether the bodies
@@ -141,87 +144,180 @@ class PairContacts(Value):
     reach: float
 
 
-@dataclass(frozen=True, eq=False)
-class IdenticalBodies(Value):
-    """``count`` identical bodies that may touch each other.
+class MovingBodies(Value):
+    """Bodies that may touch each other, numbered kind after kind; base of what the engine moves.
 
     Attributes
     ----------
-    body : MovingBody
-    count : int
-    contacts : PairContacts, optional
-        Contacts between the bodies; none by default.
-    position : (int, int)
-        The two coordinates that are a body's position.
-    period : (float, float)
-        After which the position repeats, as lengths; infinite if it does not.
+    kinds : tuple of IdenticalBodies
+    families : mapping from (int, int) to PairContacts
+        Contacts of any two bodies, by their kinds, the lower number first.
+    period : tuple of float
+        After which each component of a position repeats, as a length; infinite if it does not.
     substrate_speed : float
         Speed of the substrate along the first of them, as a length per time.
-    exit_coordinate, exit_limit : int, float
-        A body leaves when this coordinate exceeds the limit; -1: never.
-    causes : tuple of str
-        Causes of dissipation.
     """
 
-    body: MovingBody
-    count: int = 1
-    contacts: PairContacts | None = None
-    position: tuple[int, int] = (0, 0)
-    period: tuple[float, float] = (np.inf, np.inf)
-    substrate_speed: float = 0.0
-    exit_coordinate: int = -1
-    exit_limit: float = 0.0
-    causes: tuple[str, ...] = field(init=False)
-
-    def __post_init__(self) -> None:
-        causes = [IMPACT, *(contact.cause for contact in self.body.friction)]
-        if self.contacts is not None:
-            causes += [law.cause for law in self.contacts.laws]
-        object.__setattr__(self, "causes", tuple(dict.fromkeys(causes)))
-        super().__post_init__()
+    period: tuple[float, ...]
+    substrate_speed: float
 
     @property
-    def dimension(self) -> int:
-        """Number of coordinates of one body, ``k``."""
-        return len(self.body.formulation.coordinates)
+    def kinds(self) -> "tuple[IdenticalBodies, ...]":
+        """The kinds of bodies."""
+        raise NotImplementedError
 
     @property
-    def pair_contacts(self) -> tuple[str, ...]:
-        """Names of the contacts between two bodies."""
-        return () if self.contacts is None else self.contacts.gaps.names
+    def families(self) -> Mapping[tuple[int, int], PairContacts]:
+        """The contacts of any two bodies."""
+        raise NotImplementedError
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the kinds; empty if bodies have numbers only."""
+        return ()
+
+    @property
+    def starts(self) -> list[int]:
+        """The number of the first body of each kind, and of all bodies."""
+        return [0, *np.cumsum([kind.count for kind in self.kinds]).tolist()]
+
+    @property
+    def slices(self) -> "list[tuple[IdenticalBodies, slice]]":
+        """Each kind, and where its bodies are among all."""
+        return [
+            (kind, slice(*at)) for kind, at in zip(self.kinds, pairwise(self.starts), strict=True)
+        ]
+
+    @property
+    def total(self) -> int:
+        """The number of bodies."""
+        return self.starts[-1]
+
+    @cached_property
+    def kind_of(self) -> NDArray[np.int64]:
+        """The kind of each body, ``(N,)``."""
+        return np.repeat(np.arange(len(self.kinds)), [kind.count for kind in self.kinds])
+
+    @property
+    def width(self) -> int:
+        """Number of coordinates of the kind that has most of them, ``k``; others end with zeros."""
+        return max(kind.dimension for kind in self.kinds)
+
+    @property
+    def frictions(self) -> int:
+        """Number of the friction contacts of all bodies with their surroundings."""
+        return sum(kind.count * len(kind.body.friction) for kind in self.kinds)
+
+    @property
+    def gap_unit(self) -> float:
+        """Length by which gaps are scaled."""
+        return min(kind.body.gap_unit for kind in self.kinds)
+
+    @cached_property
+    def causes(self) -> tuple[str, ...]:
+        """Causes of dissipation."""
+        causes = [c.cause for kind in self.kinds for c in kind.body.friction]
+        causes += [law.cause for family in self.families.values() for law in family.laws]
+        return tuple(dict.fromkeys([IMPACT, *causes]))
+
+    @cached_property
     def contact_names(self) -> tuple[str, ...]:
-        """Names of all contacts: those of a body with its surroundings, then those of a pair."""
-        return (*self.body.contacts, *self.pair_contacts)
+        """Names of all contacts: those of bodies with their surroundings, then those of pairs."""
+        own = [name for kind in self.kinds for name in kind.body.contacts]
+        pairs = [name for family in self.families.values() for name in family.gaps.names]
+        return tuple(dict.fromkeys(own + pairs))
 
     @property
     def formula_keys(self) -> list[str]:
         """Keys of all compiled formulas: they identify expressions to the last digit."""
-        found = [self.body.formulation.key]
-        if self.body.signals is not None:
-            found.append(f"{self.body.signals.key} {self.body.signal_parameters.tolist()}")
-        found += [f"{call.family.key} {call.parameters.tolist()}" for call in self.body.gaps]
-        if self.contacts is not None:
-            slips = [family.key for family, _, _ in self.contacts.slips]
-            found += [self.contacts.gaps.key, *slips]
+        found = []
+        for kind in self.kinds:
+            body = kind.body
+            found.append(body.formulation.key)
+            if body.signals is not None:
+                found.append(f"{body.signals.key} {body.signal_parameters.tolist()}")
+            found += [f"{call.family.key} {call.parameters.tolist()}" for call in body.gaps]
+        for contacts in self.families.values():
+            found += [contacts.gaps.key, *(family.key for family, _, _ in contacts.slips)]
         return found
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of a record of all coordinates: ``(N, k)``, of kinds with names ``(D,)``."""
+        if not self.labels:
+            return self.total, self.width
+        return (sum(kind.count * kind.dimension for kind in self.kinds),)
+
+    def split(self, values: Array) -> list[Array]:
+        """Return records ``(..., *shape)`` by kind, ``(..., n, k)``."""
+        ahead = values.shape[: values.ndim - len(self.shape)]
+        ends = np.cumsum([kind.count * kind.dimension for kind in self.kinds])[:-1]
+        parts = np.split(values.reshape(*ahead, -1), ends, axis=-1)
+        return [
+            part.reshape(*ahead, kind.count, kind.dimension)
+            for part, kind in zip(parts, self.kinds, strict=True)
+        ]
+
+    def padded(self, q: Array) -> Array:
+        """Return the coordinates of all bodies, kind after kind, as ``(N, k)`` with zeros."""
+        found = np.zeros((self.total, self.width))
+        for (kind, at), part in zip(self.slices, self.split(q.reshape(self.shape)), strict=True):
+            found[at, : kind.dimension] = part
+        return found
+
+    def unpadded(self, q: Array) -> Array:
+        """Return coordinates ``(..., N, k)``, of several kinds as ``(..., D)`` without zeros."""
+        if not self.labels:
+            return q.copy()
+        parts = [q[..., at, : kind.dimension] for kind, at in self.slices]
+        return np.concatenate([part.reshape(*q.shape[:-2], -1) for part in parts], axis=-1)
+
+    def name_of(self, i: int) -> str:
+        """Return what a body is called in messages."""
+        if not self.labels:
+            return f"body {i}"
+        kind = self.kind_of[i]
+        return f"{self.labels[kind]} {i - self.starts[kind] + 1}"
 
     def check_places(self, q: Array, v: Array, dt: float) -> None:
         """Raise ValueError where a body, now or a step later, is farther than numbers resolve gaps.
 
         That is where the next number is farther than the unit of gaps, or nowhere.
         """
-        with np.errstate(all="ignore"):
-            far = (abs(q) + dt * abs(v)) * self.body.units
-            lost = np.argwhere(~(np.spacing(far) < self.body.gap_unit))
-        if len(lost):
-            i, c = lost[0].tolist()
-            name = self.body.formulation.coordinates[c]
+        for kind, at in self.slices:
+            k, unit = kind.dimension, kind.body.gap_unit
+            with np.errstate(all="ignore"):
+                far = (abs(q[at, :k]) + dt * abs(v[at, :k])) * kind.body.units
+                lost = np.argwhere(~(np.spacing(far) < unit))
+            if len(lost):
+                i, c = lost[0].tolist()
+                name, i = kind.body.formulation.coordinates[c], i + at.start
+                msg = (
+                    f"state: expected coordinates that numbers resolve to {unit:g}, the "
+                    f"unit of gaps, also a step later; got {name} = {q[i, c]:.6g} of "
+                    f"{self.name_of(i)} with the velocity {v[i, c]:.6g}"
+                )
+                raise ValueError(msg)
+
+    def positions(self, q: Array) -> Array:
+        """Return the positions of all bodies as lengths, ``(N, 3)``, zero where they have none."""
+        found = np.zeros((self.total, 3))
+        for kind, at in self.slices:
+            for component, c in enumerate(kind.axes):
+                if c >= 0:
+                    found[at, component] = q[at, c] * kind.body.units[c]
+        return found
+
+    def check_apart(self, q: Array) -> None:
+        """Raise ValueError if two bodies overlap, naming those that do most; ``q`` as below."""
+        gap, (i, j), name = self.least_pair_gap(q)
+        if gap < -OPTIONS.overlap * self.gap_unit:
+            who = (
+                f"{self.name_of(i)} and {self.name_of(j)}" if self.labels else f"bodies {i} and {j}"
+            )
             msg = (
-                f"state: expected coordinates that numbers resolve to {self.body.gap_unit:g}, the "
-                f"unit of gaps, also a step later; got {name} = {q[i, c]:.6g} of body {i} with the "
-                f"velocity {v[i, c]:.6g}"
+                f"q: expected a placement without overlap; {who} overlap by "
+                f"{-gap:.6g} at contact {name!r}"
             )
             raise ValueError(msg)
 
@@ -230,7 +326,7 @@ class IdenticalBodies(Value):
 
         Parameters
         ----------
-        q : (count, k) array
+        q : (N, k) array
             Placements of all bodies.
 
         Returns
@@ -241,21 +337,110 @@ class IdenticalBodies(Value):
         contact : str
         """
         least = (np.inf, (0, 0), "")
-        if self.contacts is None:
-            return least
-        family, reads = self.contacts.gaps, self.contacts.reads
-        numbers = np.array([*self.contacts.parameters, 0.0])
-        where = list(dict.fromkeys(self.position))
-        positions = q[:, where] * self.body.units[where]
-        periods = np.array(self.period)[-len(where) :]
-        wraps = np.isfinite(periods)
-        for i in range(self.count - 1):
-            away = positions[i + 1 :] - positions[i]
-            away[:, wraps] -= periods[wraps] * np.floor(away[:, wraps] / periods[wraps] + 0.5)
-            apart = np.linalg.norm(away, axis=1)
-            for j in (i + 1 + np.flatnonzero(apart < self.contacts.reach)).tolist():
-                at = np.array([q[(i, j)[body], c] for body, c in reads])
-                (values,) = family.kernel.at(at, numbers.ctypes.data, 0)
-                worst = int(np.argmin(values))
-                least = min(least, (float(values[worst]), (i, j), family.names[worst]))
+        positions, starts = self.positions(q), self.starts
+        for (a, b), contacts in self.families.items():
+            numbers = np.array([*contacts.parameters, 0.0])
+            for i in range(starts[a], starts[a + 1]):
+                first = max(i + 1, starts[b])
+                away = positions[first : starts[b + 1]] - positions[i]
+                for component, period in enumerate(self.period):
+                    if np.isfinite(period):
+                        x = away[:, component]
+                        x -= period * np.floor(x / period + 0.5)
+                near = np.flatnonzero(np.linalg.norm(away, axis=1) < contacts.reach)
+                for j in (first + near).tolist():
+                    at = np.array([q[(i, j)[body], c] for body, c in contacts.reads])
+                    (values,) = contacts.gaps.kernel.at(at, numbers.ctypes.data, 0)
+                    worst = int(np.argmin(values))
+                    least = min(least, (float(values[worst]), (i, j), contacts.gaps.names[worst]))
         return least
+
+
+@dataclass(frozen=True, eq=False)
+class IdenticalBodies(MovingBodies):
+    """``count`` identical bodies that may touch each other.
+
+    Attributes
+    ----------
+    body : MovingBody
+    count : int
+    contacts : PairContacts, optional
+        Contacts between the bodies; none by default.
+    position : tuple of int
+        The two or three coordinates that are a body's position; one twice if there is only one.
+    period : tuple of float
+        After which each of these repeats, as a length; infinite if it does not.
+    substrate_speed : float
+        Speed of the substrate along the first of them, as a length per time.
+    exit_coordinate, exit_limit : int, float
+        A body leaves when this coordinate exceeds the limit; -1: never.
+    """
+
+    body: MovingBody
+    count: int = 1
+    contacts: PairContacts | None = None
+    position: tuple[int, ...] = (0, 0)
+    period: tuple[float, ...] = (np.inf, np.inf)
+    substrate_speed: float = 0.0
+    exit_coordinate: int = -1
+    exit_limit: float = 0.0
+
+    @property
+    def kinds(self) -> "tuple[IdenticalBodies, ...]":
+        """The only kind."""
+        return (self,)
+
+    @property
+    def families(self) -> Mapping[tuple[int, int], PairContacts]:
+        """The contacts between two bodies, if there are any."""
+        return {} if self.contacts is None or self.count < 2 else {(0, 0): self.contacts}
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates of one body."""
+        return len(self.body.formulation.coordinates)
+
+    @property
+    def axes(self) -> tuple[int, int, int]:
+        """The coordinates that are the components of the position, -1 where there is none.
+
+        A single coordinate is the second component.
+        """
+        one, two, three = (*self.position, -1)[:3]
+        return (-1, two, three) if one == two else (one, two, three)
+
+
+@dataclass(frozen=True, eq=False)
+class SeveralKinds(MovingBodies):
+    """Bodies of several kinds that may touch each other.
+
+    Attributes
+    ----------
+    named : mapping from str to IdenticalBodies
+        The kinds by name; the contacts among bodies of one kind are its own.
+    between : mapping from (int, int) to PairContacts
+        Contacts of bodies of different kinds, by their numbers, the lower first.
+    period : tuple of float
+        As of :class:`IdenticalBodies`; those of the kinds are not used.
+    """
+
+    named: Mapping[str, IdenticalBodies]
+    between: Mapping[tuple[int, int], PairContacts]
+    period: tuple[float, ...] = (np.inf, np.inf)
+    substrate_speed: float = 0.0
+
+    @property
+    def kinds(self) -> tuple[IdenticalBodies, ...]:
+        """The kinds in their order."""
+        return tuple(self.named.values())
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The names of the kinds."""
+        return tuple(self.named)
+
+    @cached_property
+    def families(self) -> Mapping[tuple[int, int], PairContacts]:
+        """The contacts of any two bodies, by their kinds."""
+        own = {(a, a): kind.families[0, 0] for a, kind in enumerate(self.kinds) if kind.families}
+        return dict(sorted({**own, **self.between}.items()))

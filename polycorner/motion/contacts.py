@@ -1,5 +1,6 @@
 """Friction contacts of a body and families of contacts between identical bodies, in SymPy."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -40,18 +41,30 @@ def time_symbol() -> "sympy.Symbol":
     return _symbols([TIME])[0]
 
 
-def pair_coordinates(manifold: Manifold) -> "tuple[Symbols, Symbols]":
-    """Return the coordinates of two bodies: of the coordinate ``x`` the symbols ``x1``, ``x2``."""
-    given = instance("manifold", manifold, Manifold).names
-    one, two = (_symbols(f"{name}{k}" for name in given) for k in PAIR)
-    return one, two
+def pair_coordinates(
+    manifold: Manifold, other: Manifold | None = None
+) -> "tuple[Symbols, Symbols]":
+    """Return the coordinates of two bodies: of the coordinate ``x`` the symbols ``x1``, ``x2``.
+
+    Those of a second body of another kind are on the manifold ``other``.
+    """
+    one, two = _pair(manifold, other)
+    return _symbols(one), _symbols(two)
 
 
-def pair_velocities(manifold: Manifold) -> "tuple[Symbols, Symbols]":
-    """Return the velocities of two bodies: for the coordinate ``x`` ``x1_dot`` and ``x2_dot``."""
-    given = instance("manifold", manifold, Manifold).names
-    one, two = (_symbols(dotted(f"{name}{k}") for name in given) for k in PAIR)
-    return one, two
+def pair_velocities(manifold: Manifold, other: Manifold | None = None) -> "tuple[Symbols, Symbols]":
+    """Return the velocities of two bodies: for the coordinate ``x`` ``x1_dot`` and ``x2_dot``.
+
+    Those of a second body of another kind are on the manifold ``other``.
+    """
+    one, two = _pair(manifold, other)
+    return _symbols(map(dotted, one)), _symbols(map(dotted, two))
+
+
+def _pair(manifold: Manifold, other: Manifold | None) -> tuple[list[str], list[str]]:
+    one = instance("manifold", manifold, Manifold).names
+    two = one if other is None else instance("other", other, Manifold).names
+    return [f"{name}{PAIR[0]}" for name in one], [f"{name}{PAIR[1]}" for name in two]
 
 
 def _symbols(written: Any) -> "Symbols":
@@ -173,7 +186,7 @@ def _several(values: Any) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class PairFriction(FrictionLaw):
-    """Dry friction at every gap of two identical bodies, as :class:`~polycorner.Friction` of one.
+    """Dry friction at every gap of two bodies, as :class:`~polycorner.Friction` of one.
 
     Parameters
     ----------
@@ -217,11 +230,11 @@ class PairFriction(FrictionLaw):
 
 @dataclass(frozen=True)
 class ContactFamily(Checked):
-    """The contacts between any two of several identical bodies.
+    """The contacts between any two of several identical bodies, or of bodies of two kinds.
 
     Expressions are written for a pair, in the coordinates of both: of the coordinate ``x`` they
     are ``x1`` and ``x2`` (:func:`pair_coordinates`), its velocities ``x1_dot`` and ``x2_dot``
-    (:func:`pair_velocities`).
+    (:func:`pair_velocities`).  Of two kinds the first has the coordinates with 1.
 
     Parameters
     ----------
@@ -230,8 +243,8 @@ class ContactFamily(Checked):
     reach : float
         Distance of positions, in scaled coordinates, beyond which two bodies cannot touch.
     position : sequence of str, optional
-        One or two coordinates that are the position of a body, by which near pairs are found;
-        default the first two.
+        Up to three coordinates that are the position of a body, by which near pairs are found;
+        default the first two.  Of two kinds, those of both.
     friction : sequence of PairFriction, optional
         The laws of friction at the gaps, each with a convex set of its own; default none.
     restitution : float, optional
@@ -285,20 +298,20 @@ class ContactFamily(Checked):
         ]
         return told | {"restitution between bodies": self.restitution, "reach": self.reach}
 
-    def compiled(self, manifold: Manifold) -> PairContacts:
-        """Return the compiled contacts of bodies whose coordinates are those of a manifold."""
-        coordinates = tuple(s.name for one in pair_coordinates(manifold) for s in one)
-        rates = tuple(s.name for one in pair_velocities(manifold) for s in one)
+    def compiled(self, manifold: Manifold, other: Manifold | None = None) -> PairContacts:
+        """Return the compiled contacts of bodies with coordinates on a manifold, or on two."""
+        coordinates = tuple(s.name for one in pair_coordinates(manifold, other) for s in one)
+        rates = tuple(s.name for one in pair_velocities(manifold, other) for s in one)
         slips = tuple(
             (self._slips(name, (*coordinates, *rates)), False, ())
             for name in self.gaps
             if self.friction
         )
-        n = manifold.size
+        sizes = manifold.size, (other or manifold).size
         return PairContacts(
             Family.of(self.gaps, coordinates, definitions=self.definitions),
             (),
-            tuple((body, c) for body in range(2) for c in range(n)),
+            tuple((body, c) for body, n in enumerate(sizes) for c in range(n)),
             slips,
             tuple(
                 PairLaw(law.static.dimension, law.static, law.moving, law.kind)
@@ -319,20 +332,25 @@ class ContactFamily(Checked):
 
 def position_of(
     manifold: Manifold,
-    between: Any,
+    given: Sequence[str],
     substrate: Mapping[str, float],
     *,
     several: bool,
-) -> tuple[int, int]:
-    """Return the two coordinates of a position; the first is that of the substrate."""
+) -> tuple[int, ...]:
+    """Return the two or three coordinates of a position; the first is that of the substrate."""
     known, n = manifold.names, manifold.size
-    given = () if between is None else between.position
     chosen = [known.index(name) for name in given] or list(range(min(2, n)))
     moving = [known.index(name) for name in substrate]
     if moving and moving[0] not in chosen:
-        if between is not None and several:
+        if several:
             expected = f"a coordinate of the position, {', '.join(known[c] for c in chosen)}"
             refuse("substrate", expected, next(iter(substrate)))
         chosen = [moving[0]]
     chosen.sort(key=lambda c: c not in moving)
-    return chosen[0], chosen[-1]
+    return tuple(chosen) if len(chosen) > 1 else (chosen[0], chosen[0])
+
+
+def periods_of(manifold: Manifold, position: tuple[int, ...]) -> tuple[float, ...]:
+    """Return the lengths after which components of a position repeat; one alone is the second."""
+    lengths = [float(manifold.periods[c] / manifold.scales[c]) for c in position]
+    return (math.inf, lengths[1]) if position[0] == position[1] else tuple(lengths)

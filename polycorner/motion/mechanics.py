@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.bodies import MovingBodies
 from polycorner.motion.noise import Solver
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, Value
@@ -42,7 +42,7 @@ class MechanicalSystem(Value, ABC):
 
     @property
     @abstractmethod
-    def bodies(self) -> IdenticalBodies:
+    def bodies(self) -> MovingBodies:
         """The bodies and their contacts, for the engine."""
 
     @abstractmethod
@@ -83,5 +83,5 @@ class MechanicalSystem(Value, ABC):
         touch each other: errors of a step are errors of its velocities, not of what holds a pile,
         and a slip of 1e-4 of the speed of a drum's wall is 2 mm in four hours.
         """
-        piles = self.bodies.count > 2 and self.bodies.contacts is not None
+        piles = self.bodies.total > 2 and self.bodies.families
         return Solver.piles() if piles else Solver()

@@ -10,7 +10,7 @@ from polycorner.polyhedra.quotients import Quotient
 from polycorner.spaces.manifold import Array
 
 
-def check_contacts(polyhedron: Polyhedron, q: Array) -> None:
+def check_contacts(polyhedron: Polyhedron, q: Array, label: str = "") -> None:
     """Raise ValueError if a contact overlaps, naming the worst.
 
     Parameters
@@ -18,6 +18,8 @@ def check_contacts(polyhedron: Polyhedron, q: Array) -> None:
     polyhedron : Polyhedron
     q : (n,) or (N, n) array
         Placement of one body, or of several.
+    label : str, optional
+        What bodies of this kind are called.
     """
     if not polyhedron.functions:
         return
@@ -26,12 +28,12 @@ def check_contacts(polyhedron: Polyhedron, q: Array) -> None:
     if gaps[worst] < -OPTIONS.overlap * min(polyhedron.manifold.scales):
         msg = (
             f"q: expected a placement without overlap; contact {polyhedron.names[worst[-1]]!r}"
-            f"{_which(worst)} overlaps by {-gaps[worst]:.6g}"
+            f"{_which(worst, label)} overlaps by {-gaps[worst]:.6g}"
         )
         raise ValueError(msg)
 
 
-def check_equations(polyhedron: Polyhedron, q: Array) -> None:
+def check_equations(polyhedron: Polyhedron, q: Array, label: str = "") -> None:
     """Raise ValueError if an equation does not hold, or is singular, naming the first.
 
     A body may be off by what it may overlap, measured by Newton's step onto the equation.
@@ -44,16 +46,17 @@ def check_equations(polyhedron: Polyhedron, q: Array) -> None:
         name, value = polyhedron.equation_names[at[-1]], values[at]
         if not sizes[at] > 0:
             msg = (
-                f"q: expected a gradient of equation {name!r}{_which(at)} that is not zero, for "
-                f"it is the direction of its force; got zero"
+                f"q: expected a gradient of equation {name!r}{_which(at, label)} that is not zero, "
+                f"for it is the direction of its force; got zero"
             )
             raise ValueError(msg)
         if not abs(value) <= OPTIONS.overlap * sizes[at]:
-            msg = f"q: expected equation {name!r}{_which(at)} to hold; its value is {value:.6g}"
+            where = _which(at, label)
+            msg = f"q: expected equation {name!r}{where} to hold; its value is {value:.6g}"
             raise ValueError(msg)
 
 
-def check_velocities(polyhedron: Polyhedron, q: Array, v: Array) -> None:
+def check_velocities(polyhedron: Polyhedron, q: Array, v: Array, label: str = "") -> None:
     """Raise ValueError if velocities are not along an equation, naming the first."""
     if not polyhedron.equations:
         return
@@ -65,7 +68,7 @@ def check_velocities(polyhedron: Polyhedron, q: Array, v: Array) -> None:
         if abs(rates[at]) > OPTIONS.overlap * most[at]:
             msg = (
                 f"v: expected velocities along equation {polyhedron.equation_names[at[-1]]!r}"
-                f"{_which(at)}; they change it at the rate {rates[at]:.6g}"
+                f"{_which(at, label)}; they change it at the rate {rates[at]:.6g}"
             )
             raise ValueError(msg)
 
@@ -92,5 +95,7 @@ def _slopes(polyhedron: Polyhedron, q: Array) -> Array:
     return np.asarray(found)
 
 
-def _which(at: tuple[int, ...]) -> str:
+def _which(at: tuple[int, ...], label: str) -> str:
+    if label:
+        return f" of {label} {at[0] + 1}"
     return f" of body {at[0]}" if len(at) > 1 else ""

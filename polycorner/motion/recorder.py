@@ -71,6 +71,16 @@ def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
         refuse("keys", "ascending pairs of bodies", "others")
 
 
+def _body_after_body(state: "Mapping[str, Any]") -> dict[str, Any]:
+    """Return a state whose contacts stand body after body; once they stood in a row for each."""
+    found = dict(state)
+    for name, declared in declarations(EngineState).items():
+        rows = np.asarray(state.get(name))
+        if declared.shape[0] in "UF" and rows.ndim == 1 + len(declared.shape.split()):
+            found[name] = rows.reshape(-1, *rows.shape[2:])
+    return found
+
+
 class Recorder:
     """Instants and events of one run."""
 
@@ -113,7 +123,7 @@ class Recorder:
             Naming the array.
         """
         bodies = self.engine.bodies
-        N, k, count = bodies.count, bodies.dimension, len(chunk["left"])
+        N, k, count = bodies.total, bodies.width, len(chunk["left"])
         shapes: dict[str, tuple[str, tuple[int, ...]]] = {
             "t": ("f", ()),
             "q": ("f", (N, k)),
@@ -137,7 +147,7 @@ class Recorder:
         TypeError, ValueError
             Naming the array.
         """
-        engine, columns = self.engine, self.columns
+        engine, columns, state = self.engine, self.columns, _body_after_body(state)
         for name, first in (("q", engine.motion.q), ("v", engine.motion.v)):
             if (columns[name][0] != first).any():
                 refuse(name, "the start of the run at first", columns[name][0].tolist())
@@ -154,14 +164,14 @@ class Recorder:
         touching = [[t for t in some if t[1] not in system.hidden] for some in self.touching]
         sums, energies = np.array(columns["sums"]), np.array(columns["energies"])
         work = {name: sums[:, i] for i, name in enumerate(WORK)}
-        if bodies.exit_coordinate >= 0:
+        if any(kind.exit_coordinate >= 0 for kind in bodies.kinds):
             work["left"] = np.array(self.left)
         return Trajectory(
             system=system,
             dt=self.engine.dt,
             times=np.array(columns["t"]),
-            q=np.array(columns["q"]),
-            v=np.array(columns["v"]),
+            q=bodies.unpadded(np.array(columns["q"])),
+            v=bodies.unpadded(np.array(columns["v"])),
             rests=np.array(columns["rests"]),
             present=np.array(columns["alive"]),
             touching=tuple(map(tuple, touching)),

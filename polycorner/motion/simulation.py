@@ -64,8 +64,8 @@ from polycorner.checks import instance, names, real, refuse, whole
 from polycorner.errors import SolverError
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
-from polycorner.motion.bodies import IdenticalBodies
-from polycorner.motion.formulation import moment
+from polycorner.motion.bodies import MovingBodies
+from polycorner.motion.formulation import mass_and_forces
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import OPTIONS, Noise, Solver
 from polycorner.progress import Progress
@@ -284,14 +284,15 @@ def start(
 
     solver = system_solver(system) if solver is None else instance("solver", solver, Solver)
     bodies = system.bodies
-    shape = (bodies.count, bodies.dimension)
-    if state.q.size != shape[0] * shape[1]:
-        refuse("state", f"one of {shape[0]} bodies of {shape[1]} coordinates", state.q.shape)
-    frictions = len(bodies.body.friction)
-    if state.sticking.size != shape[0] * frictions:
-        refuse("state", f"one of {frictions} friction contacts a body", state.sticking.shape)
+    size = sum(kind.count * kind.dimension for kind in bodies.kinds)
+    if state.q.size != size:
+        each = " and ".join(f"{a.count} bodies of {a.dimension} coordinates" for a in bodies.kinds)
+        refuse("state", f"one of {each}", state.q.shape)
+    if state.sticking.size != bodies.frictions:
+        each = " and ".join(str(len(kind.body.friction)) for kind in bodies.kinds)
+        refuse("state", f"one of {each} friction contacts a body", state.sticking.shape)
     real("dt", dt, least=SHORTEST_STEP, unit="s")
-    placed = state.q.reshape(shape), state.v.reshape(shape)
+    placed = bodies.padded(state.q), bodies.padded(state.v)
     bodies.check_places(*placed, dt)
     _check_mass(bodies, *placed)
     system.check_placement(state.q)
@@ -300,21 +301,22 @@ def start(
         msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
         raise ValueError(msg)
     noise = Noise() if noise is None else instance("noise", noise, Noise)
-    names("kicks", noise.kicks, bodies.body.formulation.coordinates)
+    every = [name for kind in bodies.kinds for name in kind.body.formulation.coordinates]
+    names("kicks", noise.kicks, list(dict.fromkeys(every)))
     if noise.kicks and noise.kick_time:
         real("kick_time", noise.kick_time, least=dt / MOST_KICKS, unit="s")
-    sticking = np.reshape(state.sticking, (bodies.count, -1))
-    return Engine(bodies, *placed, sticking, dt, start=state.time, noise=noise, solver=solver)
+    return Engine(bodies, *placed, state.sticking, dt, start=state.time, noise=noise, solver=solver)
 
 
-def _check_mass(bodies: IdenticalBodies, q: Array, v: Array) -> None:
-    for i in range(bodies.count):
-        mass = moment(bodies.body.formulation, bodies.body.parameters, q[i], v[i]).mass
+def _check_mass(bodies: MovingBodies, q: Array, v: Array) -> None:
+    for i, a in enumerate(bodies.kind_of):
+        body, k = bodies.kinds[a].body, bodies.kinds[a].dimension
+        mass, _ = mass_and_forces(body.formulation, body.parameters, q[i, :k], v[i, :k])
         least = np.linalg.eigvalsh(mass)[0] if np.isfinite(mass).all() else np.nan
         if not (least > 0 and _is_regular(mass)):
             msg = (
                 "kinetic: expected a positive definite mass matrix; got one with the eigenvalue "
-                f"{least:.6g} at q = {q[i].tolist()}"
+                f"{least:.6g} at q = {q[i, :k].tolist()}"
             )
             raise ValueError(msg)
 
@@ -347,10 +349,10 @@ def step(system: MechanicalSystem, state: State, dt: float) -> State:
 
 def _present(engine: "Engine", like: State) -> State:
     """Return the present state, in the shape of another."""
-    motion = engine.motion
+    motion, bodies = engine.motion, engine.bodies
     return State(
         engine.time,
-        motion.q.reshape(like.q.shape).copy(),
-        motion.v.reshape(like.v.shape).copy(),
+        bodies.unpadded(motion.q).reshape(like.q.shape),
+        bodies.unpadded(motion.v).reshape(like.v.shape),
         (motion.sticks != 0).reshape(like.sticking.shape),
     )

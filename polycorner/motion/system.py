@@ -13,11 +13,10 @@ from polycorner.checks import names, real, reals, refuse, whole
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.kinds import check_fields, checked
 from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
-from polycorner.motion.contacts import ContactFamily, Friction, position_of, slip_text
+from polycorner.motion.contacts import ContactFamily, Friction, periods_of, position_of, slip_text
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
-from polycorner.motion.noise import OPTIONS
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
@@ -133,8 +132,8 @@ class System(MechanicalSystem):
         whole("count", self.count, least=1)
         if self.between is not None:
             names("position", self.between.position, self.manifold.names)
-            if len(self.between.position) > 2:
-                refuse("position", "one or two coordinates", self.between.position)
+            if len(self.between.position) > 3:
+                refuse("position", "up to three coordinates", self.between.position)
         self._check_single("substrate")
         self._check_single("exits")
         _ = self.restitutions, self.formulation, self.bodies
@@ -229,14 +228,13 @@ class System(MechanicalSystem):
             len(self.polyhedron.equations),
         )
         between = self.between if self.count > 1 else None
-        position = position_of(self.manifold, self.between, self.substrate, several=self.count > 1)
+        given = () if self.between is None else self.between.position
+        position = position_of(self.manifold, given, self.substrate, several=between is not None)
         contacts = None if between is None else between.compiled(self.manifold)
         speed = sum(v / scales[coordinates.index(x)] for x, v in self.substrate.items())
         leaving = [(coordinates.index(x), limit) for x, limit in self.exits.items()]
         exit_at, limit = leaving[0] if leaving else (-1, 0.0)
-        one, two = (float(self.manifold.periods[c] / scales[c]) for c in position)
-        period = (math.inf if position[0] == position[1] else one, two)
-        told = contacts, position, period, float(speed)
+        told = contacts, position, periods_of(self.manifold, position), float(speed)
         return IdenticalBodies(body, self.count, *told, exit_at, float(limit))
 
     # -------------------------------------------------------------------------------------- states
@@ -279,14 +277,7 @@ class System(MechanicalSystem):
         """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
         check_contacts(self.polyhedron, q)
         check_equations(self.polyhedron, q)
-        deep = -OPTIONS.overlap * min(self.manifold.scales)
-        gap, (i, j), name = self.bodies.least_pair_gap(q.reshape(self.count, -1))
-        if gap < deep:
-            msg = (
-                f"q: expected a placement without overlap; bodies {i} and {j} overlap by "
-                f"{-gap:.6g} at contact {name!r}"
-            )
-            raise ValueError(msg)
+        self.bodies.check_apart(q.reshape(self.count, -1))
 
     def sticks(self, q: Array, v: Array) -> NDArray[np.bool_]:
         """Return for each friction contact whether its slip is zero, ``(..., F)``."""
@@ -312,14 +303,8 @@ class System(MechanicalSystem):
     @checked
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit."""
-        n, scales = self.manifold.size, self.manifold.scale_array
-        law, known, held = self.formulation, self.parameters, self.polyhedron
-        squared = max(
-            highest_square(law, known, scales, q, v, bends(held, q))
-            for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
-        )
-        longest = 2 / math.sqrt(squared) if squared > 1e-12 else math.inf
-        return longest, "beyond which the motion is unstable"
+        n = self.manifold.size
+        return leapfrog_limit(self, state.q.reshape(-1, n), state.v.reshape(-1, n))
 
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""
@@ -350,3 +335,14 @@ class System(MechanicalSystem):
         if between is not None:
             told |= between.described()
         return told
+
+
+def leapfrog_limit(system: System, places: Array, speeds: Array) -> tuple[float, str]:
+    """Return the largest step of bodies ``(N, n)`` in s, and what limits it."""
+    scales, law, known = system.manifold.scale_array, system.formulation, system.parameters
+    squared = max(
+        highest_square(law, known, scales, q, v, bends(system.polyhedron, q))
+        for q, v in zip(places, speeds, strict=True)
+    )
+    longest = 2 / math.sqrt(squared) if squared > 1e-12 else math.inf
+    return longest, "beyond which the motion is unstable"

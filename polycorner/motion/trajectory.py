@@ -3,11 +3,13 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.checks import names
 from polycorner.kinds import checked
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
@@ -17,13 +19,33 @@ from polycorner.motion.placements import onto_equations
 from polycorner.motion.system import System
 from polycorner.printing import Printed, Sheet, Table, facts, listed, number, titled
 from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
+from polycorner.values import Checked, Value
 
 if TYPE_CHECKING:
     from polycorner.polyhedra.strata import Stratum
 
 ANGLES = "Angles are in radians, times in s, all else in the units of the system."
 Touch = tuple[tuple[int, ...], str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionOfKind(Value):
+    """The motion of the bodies of one kind among several.
+
+    Attributes
+    ----------
+    times : (T,) array
+    q, v : (T, n, k) array
+        Coordinates, not wrapped, and velocities.
+    rests, present : (T, n) array of bool
+        Which bodies are at rest on their substrate, and which have not left.
+    """
+
+    times: Array
+    q: Array
+    v: Array
+    rests: NDArray[np.bool_]
+    present: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +60,8 @@ class Trajectory(Checked, Printed):
         The step, in s.
     times : (T,) array
     q, v : (T, N, k) array
-        Coordinates, not wrapped, and velocities.
+        Coordinates, not wrapped, and velocities; of an :class:`~polycorner.motion.Assembly` all of
+        them, ``(T, D)``: ``trajectory["large"]`` has those of one kind, ``(T, n, k)``.
     rests, present : (T, N) array of bool
         Which bodies are at rest on their substrate, and which have not left.
     touching : tuple of T tuples
@@ -95,12 +118,29 @@ class Trajectory(Checked, Printed):
 
     def __repr__(self) -> str:
         """Return what was recorded, in one line."""
-        bodies = f"{self.q.shape[1]} {'body' if self.q.shape[1] == 1 else 'bodies'}"
+        count = self.rests.shape[1]
+        bodies = f"{count} {'body' if count == 1 else 'bodies'}"
         span = f"{self.times[0]:g} to {self.times[-1]:g} s in {len(self)} instants"
         return f"Trajectory({bodies}; {span}; {len(self.events)} events)"
 
+    def __getitem__(self, kind: str) -> MotionOfKind:
+        """Return the motion of the bodies of one kind, by its name."""
+        bodies = self.system.bodies
+        names("kind", [kind], bodies.labels)
+        start, end = bodies.starts[bodies.labels.index(kind) :][:2]
+        q, v = (self._of(values, kind) for values in (self.q, self.v))
+        return MotionOfKind(self.times, q, v, self.rests[:, start:end], self.present[:, start:end])
+
+    def _of(self, values: Array, kind: str) -> Array:
+        return self.system.bodies.split(values)[self.system.bodies.labels.index(kind)]
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """What the bodies are called, in the order of their numbers."""
+        return tuple(map(self.system.bodies.name_of, range(self.rests.shape[1])))
+
     def _sheet(self) -> Sheet:
-        tables = (_energies(self), _events(self), _last(self))
+        tables = (_energies(self), _events(self), *_last(self))
         return Sheet("Trajectory", (facts(_summary(self)), *tables, ANGLES))
 
     @property
@@ -129,7 +169,9 @@ class Trajectory(Checked, Printed):
         of them with the worst residual and the highest recorded speed.  It does not include what
         an unstable motion makes of a small displacement later.
         """
-        speeds = np.abs(self.v) * self.system.bodies.body.units
+        bodies = self.system.bodies
+        units = np.concatenate([np.tile(kind.body.units, kind.count) for kind in bodies.kinds])
+        speeds = np.abs(self.v.reshape(len(self), -1)) * units
         fastest = float(speeds.max(initial=0.0))
         return self.effort.unconverged * self.effort.residual * fastest * self.dt
 
@@ -183,7 +225,7 @@ class Trajectory(Checked, Printed):
         """
         from polycorner.polyhedra.strata import stratum_at
 
-        if not isinstance(self.system, System) or self.q.shape[1] != 1:
+        if not isinstance(self.system, System) or self.rests.shape[1] != 1:
             msg = f"stratum: expected the trajectory of a System of one body; got {self!r}"
             raise TypeError(msg)
         place = onto_equations(self.system.polyhedron, self.q[index, 0])
@@ -199,10 +241,12 @@ class Trajectory(Checked, Printed):
 
 
 def _summary(path: Trajectory) -> Iterator[tuple[str, str]]:
-    effort = path.effort
-    count, size = path.q.shape[1:]
-    each = " each" if count > 1 else ""
-    yield "bodies", f"{count}, with {size} coordinate{'s' if size > 1 else ''}{each}"
+    effort, told = path.effort, []
+    for label, kind in zip_longest(path.system.bodies.labels, path.system.bodies.kinds):
+        size, each = kind.dimension, " each" if kind.count > 1 else ""
+        many = f"{kind.count} {label}" if label else f"{kind.count}"
+        told.append(f"{many}, with {size} coordinate{'s' if size > 1 else ''}{each}")
+    yield "bodies", "; ".join(told)
     unfinished = "" if path.finished else f"; unfinished, {path.t_end:g} s were asked for"
     instants = f"in {len(path)} instants{unfinished}"
     yield "time", f"{path.times[0]:g} s to {path.times[-1]:g} s, {instants}"
@@ -233,12 +277,13 @@ def _events(path: Trajectory) -> Table:
     return Table(("event", "times"), rows, (1,))
 
 
-def _last(path: Trajectory) -> Table:
-    if isinstance(path.system, System):
-        manifold = path.system.manifold
-        titles = list(map(titled, manifold.names, manifold.periods))
-    else:
-        titles = list(path.system.bodies.body.formulation.coordinates)
-    rows = ((str(k), *(number(x, 6) for x in q)) for k, q in enumerate(path.q[-1]))
-    columns = tuple(range(len(titles) + 1))
-    return listed("Placement at last", ("body", *titles), rows, path.q.shape[1], columns)
+def _last(path: Trajectory) -> Iterator[Table]:
+    bodies = path.system.bodies
+    for label, kind, q in zip_longest(bodies.labels, bodies.kinds, bodies.split(path.q[-1])):
+        titles = list(kind.body.formulation.coordinates)
+        if isinstance(path.system, System):
+            titles = list(map(titled, titles, path.system.manifold.periods))
+        first = 1 if label else 0
+        rows = ((str(i), *(number(x, 6) for x in at)) for i, at in enumerate(q, first))
+        columns = tuple(range(len(titles) + 1))
+        yield listed("Placement at last", (label or "body", *titles), rows, kind.count, columns)

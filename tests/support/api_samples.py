@@ -54,6 +54,14 @@ def contact_family():
     return motion.ContactFamily({"touch": gap}, 1.0, friction=(pair_friction(),))
 
 
+@cache
+def assembly():
+    kinds = dict.fromkeys(("a", "b"), system())
+    return motion.Assembly(kinds, dict.fromkeys(kinds, 1), {("a", "b"): contact_family()})
+
+
+PLACES = {"a": [[0.2, 0.5]], "b": [[0.8, 0.5]]}
+assembled = cache(lambda: assembly().state(PLACES))
 proof = cache(lambda: pc.prove(certificate(), digits=8))
 corner_list = cache(lambda: proofs.corners(square(), box=UNIT))
 stationary_list = cache(lambda: proofs.stationary_points(square(), energy(), box=UNIT))

@@ -48,13 +48,15 @@ class Hostile:
         for table in calls.values():
             for call in table:
                 call[0] = self.wrapped(call[0], call[2], call[2] * call[1])
-        force = self.wrapped(model.force_kernel, k * (k + 1) // 2 + 2 * k + model.loads, 0)
-        engine.model = model._replace(force_kernel=force, **calls)
-        n, m = model.pair_inputs, model.pair_gaps
-        if model.pair_kernel:
+        loads, (kernel,) = int(model.loads[0]), model.force_kernel
+        force = self.wrapped(kernel, k * (k + 1) // 2 + 2 * k + loads, 0)
+        engine.model = model._replace(force_kernel=np.array([force]), **calls)
+        if model.families:
+            n, m = int(model.first_read[1]), int(model.pair_gaps[0])
+            pair = self.wrapped(model.pair_kernel[0], m, m * n)
+            values = self.wrapped(model.pair_values[0], m, 0)
             engine.model = engine.model._replace(
-                pair_kernel=self.wrapped(model.pair_kernel, m, m * n),
-                pair_values=self.wrapped(model.pair_values, m, 0),
+                pair_kernel=np.array([pair]), pair_values=np.array([values])
             )
         engine._allocate()
 

@@ -41,10 +41,10 @@ def book_body(model, state, mid, velocity, body, sleep, i, sums):
         sums[APPLIED_WORK] += mean * mid.applied[i, c]
         sums[NOISE_WORK] += mean * mid.kick[i, c]
     if not body.awake[i] and body.evaluated[i]:
-        for f in range(model.frictions):
+        for f in range(model.first_friction[i], model.first_friction[i + 1]):
             for r in range(model.slip_start[f + 1] - model.slip_start[f]):
-                drift = mid.slip_offset[i, model.slip_start[f] + r]
-                sums[SUBSTRATE_WORK] -= sleep.proof_friction[i, f, r] * drift
+                drift = mid.slip_offset[model.slip_start[f] + r]
+                sums[SUBSTRATE_WORK] -= sleep.proof_friction[f, r] * drift
 
 
 @compiled

@@ -72,13 +72,19 @@ def whole(shape: str = "", initial: int = 0) -> Declaration:
 
 
 class Model(NamedTuple):
-    """Model constants: what does not change during a simulation."""
+    """Model constants: what does not change during a simulation.
+
+    Gaps, friction contacts and slips with the surroundings are numbered body after body.
+    """
 
     bodies: Annotated[Any, whole()]  # N
-    dimension: Annotated[Any, whole()]  # k
+    kind: Annotated[Any, whole("N")]  # of each body
+    dimension: Annotated[Any, whole()]  # k: coordinates of a body; bodies with fewer have zeros
     lanes: Annotated[Any, whole()]  # K: coordinates of a body, and zeros up to whole vectors
-    force_kernel: Annotated[Any, whole()]  # address: upper triangle of M, F, applied forces, loads
-    slip_kernels: Annotated[Any, whole()]  # kernels of a body's slips; as those of its gaps
+    coordinates: Annotated[Any, whole("A")]  # of a body of each kind
+    force_kernel: Annotated[Any, whole("A")]  # address: upper triangle of M, F, applied, loads
+    force_parameters: Annotated[Any, whole("A")]  # their first parameter
+    first_slip_call: Annotated[Any, whole("A+1")]  # kernels of a body's slips; as those of its gaps
     slip_calls: Annotated[Any, whole("* 6")]
     slip_reads: Annotated[Any, whole("*")]  # coordinates, then velocities
     slip_places: Annotated[Any, whole("*")]
@@ -86,8 +92,8 @@ class Model(NamedTuple):
     neighbour_room: Annotated[Any, whole()]  # P: pairs of neighbours
     event_room: Annotated[Any, whole()]  # events after which no step begins, nor a part of one
     parameters: Annotated[Any, real("*")]  # of all kernels
-    loads: Annotated[Any, whole()]  # number of known loads
-    frictions: Annotated[Any, whole()]  # F: friction contacts of a body with its surroundings
+    loads: Annotated[Any, whole("A")]  # number of known loads of a body
+    first_friction: Annotated[Any, whole("N+1")]  # of each body's friction contacts, among all
     slip_start: Annotated[Any, whole("F+1")]  # first slip row of each friction contact
     friction_sets: Annotated[Any, whole("F 2")]  # static and dynamic set
     pressing_gap: Annotated[Any, whole("F")]  # gap whose contact presses, or -1
@@ -97,35 +103,44 @@ class Model(NamedTuple):
     set_sizes: Annotated[Any, real("* 4")]
     first_vertex: Annotated[Any, whole("*")]  # of each set, and one more
     vertices: Annotated[Any, real("* 2")]  # of polygons
-    gap_kernels: Annotated[Any, whole()]  # kernels of a body's gaps
+    first_gap_call: Annotated[Any, whole("A+1")]  # kernels of a body's gaps
     gap_calls: Annotated[Any, whole("* 6")]  # address, sizes in and out; first read, row, parameter
     gap_reads: Annotated[Any, whole("*")]  # coordinates, call after call
-    gap_places: Annotated[Any, whole("*")]  # gap of each output, or -1
-    restitution: Annotated[Any, real("m")]  # of a body's contacts with its surroundings
-    unilateral: Annotated[Any, whole()]  # number of these contacts; further gaps are equations
-    pair_kernel: Annotated[Any, whole()]  # address: gaps of a pair, or 0
-    pair_values: Annotated[Any, whole()]  # address: gaps without gradients
-    pair_parameters: Annotated[Any, whole()]  # their first parameter
-    pair_inputs: Annotated[Any, whole()]  # coordinates that they read
+    gap_places: Annotated[Any, whole("*")]  # gap of each output among those of its body, or -1
+    first_gap: Annotated[Any, whole("N+1")]  # of each body's gaps, among all
+    first_equation: Annotated[Any, whole("N")]  # of them that is an equation, as all further ones
+    equations: Annotated[Any, whole()]  # their number, of all bodies
+    restitution: Annotated[Any, real("U")]  # of contacts with surroundings
+    families: Annotated[Any, whole()]  # J: of contacts between bodies; 0: none
+    family: Annotated[Any, whole("A A")]  # of two bodies, by their kinds; -1: none
+    pair_kernel: Annotated[Any, whole("J")]  # address: gaps of a pair
+    pair_values: Annotated[Any, whole("J")]  # address: gaps without gradients
+    pair_parameters: Annotated[Any, whole("J")]  # their first parameter
+    first_read: Annotated[Any, whole("J+1")]  # of the coordinates that they read
     pair_reads: Annotated[Any, whole("* 2")]  # body 0 or 1, coordinate
-    pair_gaps: Annotated[Any, whole()]  # number of gaps of a pair
-    pair_laws: Annotated[Any, whole()]  # H: laws of friction at each of these
+    pair_gaps: Annotated[Any, whole("J")]  # number of gaps of a pair
+    most_pair_gaps: Annotated[Any, whole()]  # G
+    first_law: Annotated[Any, whole("J+1")]  # of the laws of friction at each of these
+    first_pair_slip: Annotated[Any, whole("J")]
     pair_slips: Annotated[Any, whole("* 3")]  # address, whether bodies are exchanged, parameters
-    pair_slip_start: Annotated[Any, whole("H+1")]  # first slip row of each law
+    law_start: Annotated[Any, whole("H")]  # first slip row of each law, among those of its family
+    law_rows: Annotated[Any, whole("H")]  # number of its slip rows
     pair_sets: Annotated[Any, whole("H 2")]  # static and dynamic set
     pair_causes: Annotated[Any, whole("H")]  # cause under which dissipation is booked
-    pair_restitution: Annotated[Any, real()]
-    position: Annotated[Any, whole("2")]  # coordinates that are a body's position
-    period: Annotated[Any, real("2")]  # after which it repeats, as lengths, or inf
-    units: Annotated[Any, real("k")]  # length of a unit of each coordinate
+    pair_restitution: Annotated[Any, real("J")]
+    pair_reach: Annotated[Any, real("J")]  # distance of positions beyond which two cannot touch
+    reach: Annotated[Any, real()]  # the largest of them
+    position: Annotated[Any, whole("A 3")]  # coordinates that are a body's position, or -1
+    period: Annotated[Any, real("3")]  # after which it repeats, as lengths, or inf
+    units: Annotated[Any, real("A k")]  # length of a unit of each coordinate
+    substrate_coordinate: Annotated[Any, whole("A")]  # along which the substrate moves
     substrate_speed: Annotated[Any, real()]  # along the first component of the position
-    reach: Annotated[Any, real()]  # distance of positions beyond which bodies cannot touch
-    exit_coordinate: Annotated[Any, whole()]  # or -1
-    exit_limit: Annotated[Any, real()]
+    exit_coordinate: Annotated[Any, whole("A")]  # or -1
+    exit_limit: Annotated[Any, real("A")]
     gap_unit: Annotated[Any, real()]  # length by which gaps are scaled
     chatter: Annotated[Any, real()]  # relative amplitude of the noise of known loads
     correlation_time: Annotated[Any, real()]  # for which one of its values holds
-    kicks: Annotated[Any, real("k")]  # intensities of random impulses
+    kicks: Annotated[Any, real("A k")]  # intensities of random impulses
     kick_time: Annotated[Any, real()]  # for which a random force is held; 0: white noise
     seed: Annotated[Any, whole()]
     tolerance: Annotated[Any, real()]  # of residuals, relative to speeds
@@ -142,11 +157,11 @@ class Model(NamedTuple):
     dependent: Annotated[Any, real()]
     near: Annotated[Any, real()]  # scaled travel in a step up to which a plastic impact is slow
     near_many: Annotated[Any, real()]  # the same for bodies in a crowd
-    constant_mass: Annotated[Any, whole()]  # whether the mass matrix is constant
+    constant_mass: Annotated[Any, whole("A")]  # whether the mass matrix is constant
     follows_velocity: Annotated[Any, whole()]  # whether forces depend on the velocity
-    time_parameter: Annotated[Any, whole()]  # position of the time among the parameters, or -1
-    signal_kernel: Annotated[Any, whole()]  # address: parameters that follow the time, or 0
-    signal_parameters: Annotated[Any, whole()]  # its first parameter
+    time_parameter: Annotated[Any, whole("A")]  # position of the time among the parameters, or -1
+    signal_kernel: Annotated[Any, whole("A")]  # address: parameters that follow the time, or 0
+    signal_parameters: Annotated[Any, whole("A")]  # its first parameter
     follows_time: Annotated[Any, whole()]  # whether forces may change much from step to step
     start: Annotated[Any, real()]  # time of the first state
     step: Annotated[Any, real()]  # length of a whole step
@@ -161,16 +176,16 @@ class EngineState(NamedTuple):
 
     q: Annotated[Any, real("N k")]  # coordinates
     v: Annotated[Any, real("N k")]  # velocities
-    sticks: Annotated[Any, whole("N F")]  # whether a friction contact with the surroundings sticks
-    friction: Annotated[Any, real("N F 2")]  # its impulse
-    normal: Annotated[Any, real("N m")]  # normal impulses of contacts with the surroundings
-    touches: Annotated[Any, whole("N m")]  # whether they touch
-    pressed: Annotated[Any, real("N m")]  # normal impulse before the last
-    release: Annotated[Any, real("N m")]  # when it would vanish, as it fell last
+    sticks: Annotated[Any, whole("F")]  # whether a friction contact with the surroundings sticks
+    friction: Annotated[Any, real("F 2")]  # its impulse
+    normal: Annotated[Any, real("U")]  # normal impulses of contacts with the surroundings
+    touches: Annotated[Any, whole("U")]  # whether they touch
+    pressed: Annotated[Any, real("U")]  # normal impulse before the last
+    release: Annotated[Any, real("U")]  # when it would vanish, as it fell last
     alive: Annotated[Any, whole("N", initial=1)]  # whether a body has not left
     rests: Annotated[Any, whole("N")]  # whether it has exactly the velocity of rest
     asleep: Annotated[Any, whole("N")]  # whether its rest is proved and it is not solved for
-    booked_friction: Annotated[Any, real("N F 2")]  # friction impulses when work was booked last
+    booked_friction: Annotated[Any, real("F 2")]  # friction impulses when work was booked last
     booked_applied: Annotated[Any, real("N k")]  # impulses of applied forces then
     check_due: Annotated[Any, whole("N")]  # step in which a sleeper is checked again
     booked_to: Annotated[Any, whole("N")]  # step up to which its work is booked
@@ -205,11 +220,11 @@ class MidpointWork(NamedTuple):
     applied: Annotated[Any, real("N k")]  # that of the applied forces among them
     kick: Annotated[Any, real("N k")]  # random impulse
     inverse_mass: Annotated[Any, real("N k K")]
-    slip_rows: Annotated[Any, real("N R K")]  # Jacobian of the slip velocities
-    slip_offset: Annotated[Any, real("N R")]  # slip velocity at zero velocity
-    load: Annotated[Any, real("N F")]  # known normal impulse
-    gap: Annotated[Any, real("N m", initial=np.inf)]
-    gradient: Annotated[Any, real("N m K")]  # of the gaps
+    slip_rows: Annotated[Any, real("R K")]  # Jacobian of the slip velocities
+    slip_offset: Annotated[Any, real("R")]  # slip velocity at zero velocity
+    load: Annotated[Any, real("F")]  # known normal impulse
+    gap: Annotated[Any, real("U", initial=np.inf)]
+    gradient: Annotated[Any, real("U K")]  # of the gaps
     mass: Annotated[Any, real("N k K")]
 
 
@@ -240,16 +255,16 @@ class AheadWork(NamedTuple):
     """Bodies at the next midpoint, as predicted."""
 
     q: Annotated[Any, real("N k")]  # prediction for the next midpoint
-    gap: Annotated[Any, real("N m")]  # gaps there
-    gradient: Annotated[Any, real("N m K")]
+    gap: Annotated[Any, real("U")]  # gaps there
+    gradient: Annotated[Any, real("U K")]
 
 
 class PathWork(NamedTuple):
     """A body at a place on its way."""
 
     q: Annotated[Any, real("N k")]  # coordinates on the way
-    gap: Annotated[Any, real("N m")]  # gaps there
-    gradient: Annotated[Any, real("N m K")]
+    gap: Annotated[Any, real("U")]  # gaps there
+    gradient: Annotated[Any, real("U K")]
 
 
 class SleepWork(NamedTuple):
@@ -257,8 +272,8 @@ class SleepWork(NamedTuple):
 
     neighbour_impulse: Annotated[Any, real("N k")]
     disturbed: Annotated[Any, whole("N")]  # whether a sleeper's contacts changed
-    proof_friction: Annotated[Any, real("N F 2")]  # impulses that prove rest
-    proof_normal: Annotated[Any, real("N m")]
+    proof_friction: Annotated[Any, real("F 2")]  # impulses that prove rest
+    proof_normal: Annotated[Any, real("U")]
     rested: Annotated[Any, whole("N")]  # `EngineState.rests` before the step
 
 
@@ -284,7 +299,7 @@ class NeighbourWork(NamedTuple):
     status: Annotated[Any, whole("3")]  # numbers of neighbours; whether valid; of contacts
     examined: Annotated[Any, whole("P")]  # whether a pair was examined in this step
     least_gap: Annotated[Any, real("P")]  # of a pair at the midpoint; 0: not known
-    position: Annotated[Any, real("N 2")]  # positions when the list was made
+    position: Annotated[Any, real("N 3")]  # positions when the list was made
     travel: Annotated[Any, real("1")]  # how far bodies may move in a step, as listed
     meets: Annotated[Any, whole("P")]  # how many small gaps of a pair were counted
 
@@ -299,6 +314,7 @@ class PairWork(NamedTuple):
     gradient: Annotated[Any, real("C 2*K")]
     sort_keys: Annotated[Any, whole("S")]
     ranked: Annotated[Any, whole("C")]  # contacts between bodies by key
+    first_block: Annotated[Any, whole("C")]  # where the blocks of each begin, by key
     block_of: Annotated[Any, whole("C")]  # block of each, or -1
     met: Annotated[Any, whole("C")]  # whether a contact of the last step is found in this one
 

@@ -25,6 +25,7 @@ from polycorner.motion.engine.evaluation import (
     evaluate_gaps,
     evaluate_pair_gaps,
 )
+from polycorner.motion.engine.families import family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rows import (
@@ -99,25 +100,25 @@ def is_independent(model, mid, scratch, i, g):
     The gradients of those that do not are made orthonormal with the inverse mass matrix.
     """
     never_inline()
-    k, row = model.dimension, scratch.equation_rows[g]
-    square, left = 0.0, 0.0
+    k, start = model.dimension, model.first_gap[i]
+    row, square, left = scratch.equation_rows[g - start], 0.0, 0.0
     for c in range(k):
-        row[c] = mid.gradient[i, g, c]
-    for other in range(model.unilateral, g + 1):
+        row[c] = mid.gradient[g, c]
+    for other in range(model.first_equation[i], g + 1):
         product = 0.0
         # Equations that were left out before have no direction of their own to be taken away.
-        base = scratch.equation_rows[other]
+        base = scratch.equation_rows[other - start]
         for c in range(k):
             for a in range(k):
                 product += base[c] * mid.inverse_mass[i, c, a] * row[a]
         if other == g:
             left = product
-        elif scratch.own_block[other] >= 0:
+        elif scratch.own_block[other - start] >= 0:
             for c in range(k):
                 row[c] -= product * base[c]
     for c in range(k):
         for a in range(k):
-            square += mid.gradient[i, g, c] * mid.inverse_mass[i, c, a] * mid.gradient[i, g, a]
+            square += mid.gradient[g, c] * mid.inverse_mass[i, c, a] * mid.gradient[g, a]
     if not left > model.dependent**2 * square:
         return False
     for c in range(k):
@@ -148,21 +149,21 @@ def add_body_blocks(model, state, work, i, h, limit, count):
     """Append the blocks of a body's contacts with its surroundings; return the block count."""
     manner, mid, velocity, body, ahead = work.manner, work.mid, work.velocity, work.body, work.ahead
     block, scratch = work.block, work.scratch
-    m, share = model.restitution.size, h / model.step
+    share, start, bound = h / model.step, model.first_gap[i], model.first_equation[i]
     block_of, predicted = scratch.own_block, False
-    for g in range(m):
-        block_of[g] = -1
-        at, gap = (i * m + g) * model.lanes, mid.gap[i, g]
+    for g in range(start, model.first_gap[i + 1]):
+        block_of[g - start] = -1
+        at, gap = g * model.lanes, mid.gap[g]
         before = row_times(model, mid.gradient, at, velocity.old, i, NONE)
         free = row_times(model, mid.gradient, at, velocity.free, i, NONE)
-        closed = state.touches[i, g] != 0
+        closed = state.touches[g] != 0
         close = gap + h * min(before, free, 0.0) < limit
         if manner.located[0]:
             close = acts(model, manner, gap, before, model.restitution[g], closed)
-        if g >= model.unilateral:
+        if g >= bound:
             close = closed = is_independent(model, mid, scratch, i, g)
         if not close and not closed:
-            state.normal[i, g], state.pressed[i, g] = 0.0, 0.0
+            state.normal[g], state.pressed[g] = 0.0, 0.0
             continue
         if not predicted:
             # Only for bodies with a contact: the evaluation costs as much as that of the midpoint.
@@ -170,21 +171,21 @@ def add_body_blocks(model, state, work, i, h, limit, count):
             predicted = True
         b = count
         count += 1
-        block_of[g] = b
+        block_of[g - start] = b
         new_block(block, b, i, NONE, ZERO)
         copy_lanes(model, mid.gradient, at, block.jacobian, row_at(model, b, ZERO))
         change = 0.0
-        if g >= model.unilateral:
+        if g >= bound:
             # In an instant nothing curves, and a change over h would be rounding over next to
             # nothing.
             if h > STRAIGHT * model.step:
-                change = ahead.gap[i, g] - gap - h * before
+                change = ahead.gap[g] - gap - h * before
             block.bound[b] = PLAIN
             block.offset[b, 0] = equation_offset(model, gap, change, h)
             block.bilateral[b], block.bounces[b] = ONE, ZERO
         else:
             if closed or not manner.located[0]:
-                change = curvature_change(model, gap, before, ahead.gap[i, g], h)
+                change = curvature_change(model, gap, before, ahead.gap[g], h)
             body.touched[i] = ALONE
             least, block.bounces[b] = least_velocity(
                 model, manner, gap, closed, before, free, change, model.restitution[g], h
@@ -193,13 +194,14 @@ def add_body_blocks(model, state, work, i, h, limit, count):
             block.bound[b] = kind_of_bound(model, closed, gap + change)
         block.load[b] = -change
         block.origin[b, 0], block.origin[b, 1], block.origin[b, 2] = OWN_GAP, i, g
-        block.impulse[b, 0] = state.normal[i, g] * share
+        block.impulse[b, 0] = state.normal[g] * share
         finish_block(model, mid, velocity, body, block, b)
-    for f in range(model.frictions):
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
         pressing = model.pressing_gap[f]
-        if (pressing < 0 and mid.load[i, f] <= 0.0) or (pressing >= 0 and block_of[pressing] < 0):
-            state.friction[i, f, 0], state.friction[i, f, 1] = 0.0, 0.0
-            state.sticks[i, f] = 0
+        presses = block_of[pressing - start] if pressing >= 0 else NONE
+        if presses < 0 and (pressing >= 0 or mid.load[f] <= 0.0):
+            state.friction[f, 0], state.friction[f, 1] = 0.0, 0.0
+            state.sticks[f] = 0
             continue
         b = count
         count += 1
@@ -207,15 +209,15 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         new_block(block, b, i, NONE, model.slip_start[f + 1] - first)
         body.touched[i] = ALONE
         for r in range(block.rows[b]):
-            block.offset[b, r] = mid.slip_offset[i, first + r]
-            block.impulse[b, r] = state.friction[i, f, r] * share
-            at = (i * model.slip_start[model.frictions] + first + r) * model.lanes
+            block.offset[b, r] = mid.slip_offset[first + r]
+            block.impulse[b, r] = state.friction[f, r] * share
+            at = (first + r) * model.lanes
             copy_lanes(model, mid.slip_rows, at, block.jacobian, row_at(model, b, r))
-        block.set[b] = model.friction_sets[f, 0 if state.sticks[i, f] else 1]
+        block.set[b] = model.friction_sets[f, 0 if state.sticks[f] else 1]
         if pressing >= 0:
-            block.pressing[b] = block_of[pressing]
+            block.pressing[b] = presses
         else:
-            block.load[b] = mid.load[i, f]
+            block.load[b] = mid.load[f]
         block.origin[b, 0], block.origin[b, 1], block.origin[b, 2] = OWN_FRICTION, i, f
         finish_block(model, mid, velocity, body, block, b)
     return count
@@ -233,7 +235,9 @@ def add_pair_blocks(model, state, work, contact, h, count):
     free = row_times(model, rows, at, velocity.free, i, j)
     index, gap = pair.before[contact], pair.gap[contact]
     closed = index >= 0 and state.pair_flags[index, 1] != 0
-    if manner.located[0] and not acts(model, manner, gap, before, model.pair_restitution, closed):
+    family = family_of(model, i, j)
+    bounce = model.pair_restitution[family]
+    if manner.located[0] and not acts(model, manner, gap, before, bounce, closed):
         return count
     n = count
     new_block(block, n, i, j, ZERO)
@@ -244,7 +248,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
     if closed or not manner.located[0]:
         change = curvature_change(model, gap, before, work.scratch.pair_gap[g], h)
     least, block.bounces[n] = least_velocity(
-        model, manner, gap, closed, before, free, change, model.pair_restitution, h
+        model, manner, gap, closed, before, free, change, bounce, h
     )
     block.offset[n, 0] = -least
     block.load[n] = -change
@@ -252,47 +256,58 @@ def add_pair_blocks(model, state, work, contact, h, count):
     block.origin[n, 0], block.origin[n, 1], block.origin[n, 2] = PAIR_GAP, contact, g
     block.impulse[n, 0] = pair.impulse[contact, 0]
     finish_block(model, work.mid, velocity, body, block, n)
-    return count + 1 if model.pair_laws == 0 else add_friction(model, state, work, contact, n)
+    if model.first_law[family] == model.first_law[family + 1]:
+        return count + 1
+    return add_friction(model, state, work, contact, n)
 
 
 @compiled
 def add_friction(model, state, work, contact, pressing):
     """Append the blocks of friction at a contact after that which presses; return the count."""
     mid, pair, block = work.mid, work.pair, work.block
-    k, K, values, reads = model.dimension, model.lanes, work.scratch.values, model.pair_inputs
+    k, K, values = model.dimension, model.lanes, work.scratch.values
     i, j, g = pair.contact[contact, 0], pair.contact[contact, 1], pair.contact[contact, 2]
-    address, p0, starts = model.pair_slips[g, 0], model.pair_slips[g, 2], model.pair_slip_start
+    family = family_of(model, i, j)
+    slip, reads = model.first_pair_slip[family] + g, pair_inputs(model, family)
+    first_law, last_law = model.first_law[family], model.first_law[family + 1]
     # One kernel serves both orders of two bodies, so that a pair has the same bits whichever comes
     # first.
-    first, second = (j, i) if model.pair_slips[g, 1] else (i, j)
+    first, second = (j, i) if model.pair_slips[slip, 1] else (i, j)
+    one, two = model.coordinates[model.kind[first]], model.coordinates[model.kind[second]]
     for a in range(reads):
-        which = first if model.pair_reads[a, 0] == 0 else second
-        values[a] = mid.q[which, model.pair_reads[a, 1]]
-    for c in range(k):
-        values[reads + c], values[reads + k + c] = state.v[first, c], state.v[second, c]
+        read = model.first_read[family] + a
+        which = first if model.pair_reads[read, 0] == 0 else second
+        values[a] = mid.q[which, model.pair_reads[read, 1]]
+    for c in range(one):
+        values[reads + c] = state.v[first, c]
+    for c in range(two):
+        values[reads + one + c] = state.v[second, c]
     start, base = values.ctypes.data, model.parameters.ctypes.data
-    v0 = reads + 2 * k
-    j0 = v0 + starts[model.pair_laws]
-    call_kernel(address, start, base + 8 * p0, start + 8 * v0, start + 8 * j0, start)
+    v0 = reads + one + two
+    j0 = v0 + model.law_start[last_law - 1] + model.law_rows[last_law - 1]
+    known = base + 8 * model.pair_slips[slip, 2]
+    call_kernel(model.pair_slips[slip, 0], start, known, start + 8 * v0, start + 8 * j0, start)
     index = pair.before[contact]
     stuck = state.pair_flags[index, 0] if index >= 0 else ZERO
-    for f in range(model.pair_laws):
-        b = pressing + 1 + f
-        new_block(block, b, first, second, starts[f + 1] - starts[f])
+    for f in range(first_law, last_law):
+        b = pressing + 1 + f - first_law
+        new_block(block, b, first, second, model.law_rows[f])
         for r in range(block.rows[b]):
-            row = starts[f] + r
+            row = model.law_start[f] + r
             value = values[v0 + row]
-            for c in range(2 * k):
+            for c in range(k):  # another block may have stood here, of bodies of other kinds
+                block.jacobian[b, r, c] = block.jacobian[b, r, K + c] = 0.0
+            for c in range(one + two):
                 slope = values[j0 + row * v0 + reads + c]
-                block.jacobian[b, r, c if c < k else K + c - k] = slope
+                block.jacobian[b, r, c if c < one else K + c - one] = slope
                 value -= slope * values[reads + c]
             block.offset[b, r] = value
             block.impulse[b, r] = pair.impulse[contact, 1 + row]
-        block.set[b] = model.pair_sets[f, 0 if stuck >> f & 1 else 1]
+        block.set[b] = model.pair_sets[f, 0 if stuck >> (f - first_law) & 1 else 1]
         block.pressing[b] = pressing
         block.origin[b, 0], block.origin[b, 1], block.origin[b, 2] = PAIR_FRICTION, contact, f
         finish_block(model, mid, work.velocity, work.body, block, b)
-    return pressing + 1 + model.pair_laws
+    return pressing + 1 + last_law - first_law
 
 
 @compiled
@@ -307,6 +322,17 @@ def assemble_body_blocks(model, state, work, h, limit):
 
 
 @compiled
+def place_blocks(model, pair, contacts, first):
+    """Note where the blocks of each contact begin, the first at a place; return where they end."""
+    for s in range(contacts):
+        contact = pair.ranked[s]
+        family = family_of(model, pair.contact[contact, 0], pair.contact[contact, 1])
+        pair.first_block[s] = first
+        first += 1 + model.first_law[family + 1] - model.first_law[family]
+    return first
+
+
+@compiled
 def assemble_contacts(model, state, work, h, begin, end, blocks):
     """Assemble the blocks of a range of contacts in their order; return the block count."""
     pair, scratch = work.pair, work.scratch
@@ -317,8 +343,10 @@ def assemble_contacts(model, state, work, h, begin, end, blocks):
         if pair.contact[contact, 0] != first or pair.contact[contact, 1] != second:
             first, second = pair.contact[contact, 0], pair.contact[contact, 1]
             evaluate_pair_gaps(model, scratch, first, second, work.ahead.q)
-            for g in range(model.pair_gaps):
-                scratch.pair_gap[g] = scratch.values[model.pair_inputs + g]
+            family = family_of(model, first, second)
+            n = pair_inputs(model, family)
+            for g in range(model.pair_gaps[family]):
+                scratch.pair_gap[g] = scratch.values[n + g]
         blocks = add_pair_blocks(model, state, work, contact, h, blocks)
     return blocks
 
@@ -372,22 +400,22 @@ def predict_body(model, state, work, i, h, limit):
 @compiled
 def is_apart(model, state, manner, mid, velocity, i, h, limit):
     """Return whether a body has no block with its surroundings; then they press on it no more."""
-    m = model.restitution.size
-    for f in range(model.frictions):
-        if model.pressing_gap[f] < 0 and mid.load[i, f] > 0.0:
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
+        if model.pressing_gap[f] < 0 and mid.load[f] > 0.0:
             return False
-    for g in range(m):
-        at = (i * m + g) * model.lanes
+    for g in range(model.first_gap[i], model.first_gap[i + 1]):
+        at = g * model.lanes
         before = row_times(model, mid.gradient, at, velocity.old, i, NONE)
         free = row_times(model, mid.gradient, at, velocity.free, i, NONE)
-        close = mid.gap[i, g] + h * min(before, free, 0.0) < limit
+        close = mid.gap[g] + h * min(before, free, 0.0) < limit
         # The same conditions as in :func:`add_body_blocks`, so that leaving a body out changes no
         # bit.
-        if g >= model.unilateral or close or state.touches[i, g] != 0 or manner.located[0]:
+        bilateral = g >= model.first_equation[i]
+        if bilateral or close or state.touches[g] != 0 or manner.located[0]:
             return False
-    for g in range(m):
-        state.normal[i, g], state.pressed[i, g] = 0.0, 0.0
-    for f in range(model.frictions):
-        state.friction[i, f, 0], state.friction[i, f, 1] = 0.0, 0.0
-        state.sticks[i, f] = 0
+    for g in range(model.first_gap[i], model.first_gap[i + 1]):
+        state.normal[g], state.pressed[g] = 0.0, 0.0
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
+        state.friction[f, 0], state.friction[f, 1] = 0.0, 0.0
+        state.sticks[f] = 0
     return True

@@ -1,6 +1,7 @@
 """Velocity bounds: how fast a gap may close in a step, and which contacts act in one."""
 
 from polycorner.motion.engine.arrays import OWN_GAP
+from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 
 
@@ -73,9 +74,10 @@ def least_velocity_of(model, state, manner, mid, pair, block, b, free, h):
     """Return the least normal velocity that the contact of a block allows."""
     i, g = block.origin[b, 1], block.origin[b, 2]
     if block.origin[b, 0] == OWN_GAP:
-        gap, closed, bounce = mid.gap[i, g], state.touches[i, g] != 0, model.restitution[g]
+        gap, closed, bounce = mid.gap[g], state.touches[g] != 0, model.restitution[g]
     else:
-        index, bounce = pair.before[i], model.pair_restitution
+        index = pair.before[i]
+        bounce = model.pair_restitution[family_of(model, block.bodies[b, 0], block.bodies[b, 1])]
         gap, closed = pair.gap[i], index >= 0 and state.pair_flags[index, 1] != 0
     change, before = -block.load[b], block.before[b, 0]
     least, _ = least_velocity(model, manner, gap, closed, before, free, change, bounce, h)

@@ -44,12 +44,12 @@ def begin_compact(model, state, mid, crowd, i):
     k, K, root, at = model.dimension, model.lanes, crowd.mass_root[i], state.rank[i]
     for c in range(K):
         crowd.unit_velocity[at, c] = crowd.unit_shift[at, c] = 0.0
-    if model.constant_mass and root[0, 0] > 0.0:
+    if model.constant_mass[model.kind[i]] and root[0, 0] > 0.0:
         return
     for a in range(k):
         for c in range(k):
             root[a, c] = mid.inverse_mass[i, a, c] if c <= a else 0.0
-    if not factorise(root, k):
+    if not factorise(root, model.coordinates[model.kind[i]]):
         # The body and all that touches it become not a number, which stops the run with a reason.
         root[0, 0] = np.nan
 
@@ -137,7 +137,7 @@ def compact_contact(model, state, work, r, b, pressed):
 def gap_of(mid, pair, block, b):
     """Return the gap of a unilateral block."""
     if block.bodies[b, 1] < 0:
-        return mid.gap[block.bodies[b, 0], block.origin[b, 2]]
+        return mid.gap[block.origin[b, 2]]
     return pair.gap[block.origin[b, 1]]
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
+from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import key_of, pair_of
+from polycorner.motion.engine.neighbours import bodies_of, key_of
 from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rows import sticks
 
@@ -34,14 +35,14 @@ def store_impulses(model, state, pair, block, begin, end, h):
     for b in range(begin, end):
         kind, i, f = block.origin[b, 0], block.origin[b, 1], block.origin[b, 2]
         if kind == OWN_GAP:
-            state.normal[i, f] = block.impulse[b, 0] / share
+            state.normal[f] = block.impulse[b, 0] / share
         elif kind == PAIR_GAP:
             pair.impulse[i, 0] = block.impulse[b, 0]
         for r in range(block.rows[b]):
             if kind == OWN_FRICTION:
-                state.friction[i, f, r] = block.impulse[b, r] / share
+                state.friction[f, r] = block.impulse[b, r] / share
             else:
-                pair.impulse[i, 1 + model.pair_slip_start[f] + r] = block.impulse[b, r]
+                pair.impulse[i, 1 + model.law_start[f] + r] = block.impulse[b, r]
 
 
 @compiled
@@ -82,14 +83,14 @@ def observe_block(model, state, work, b, h, time, sums):
     if not takes_part(body, block, b):
         return
     if kind == OWN_FRICTION:
-        state.sticks[i, g] = 1 if sticks(model, body, block, b) else 0
+        state.sticks[g] = 1 if sticks(model, body, block, b) else 0
     # Friction and equations neither open nor close.
     if block.rows[b] > 0 or block.bilateral[b]:
         return
     out, share, before = work.scratch.image, h / model.step, block.before[b, 0]
     if kind == OWN_GAP:
-        gap, was = work.mid.gap[i, g], state.touches[i, g] != 0
-        pressed, release = state.pressed[i, g], state.release[i, g]
+        gap, was = work.mid.gap[g], state.touches[g] != 0
+        pressed, release = state.pressed[g], state.release[g]
     else:
         pair.block_of[i] = b
         gap, index = pair.gap[i], pair.before[i]
@@ -112,10 +113,10 @@ def observe_block(model, state, work, b, h, time, sums):
             release = when
         event.happened[b], event.time[b] = np.int64(out[1]), when
     if kind == OWN_GAP:
-        state.touches[i, g] = 1 if out[0] > 0.0 else 0
-        state.release[i, g] = release
+        state.touches[g] = 1 if out[0] > 0.0 else 0
+        state.release[g] = release
         if share > INSTANT:
-            state.pressed[i, g] = block.impulse[b, 0] / share
+            state.pressed[g] = block.impulse[b, 0] / share
     else:
         block.origin[b, 3] = 1 if out[0] > 0.0 else 0
         event.release[b] = release
@@ -171,11 +172,11 @@ def keep_contacts(model, state, body, pair, log, h, time, count):
     for s in range(state.counts[CONTACTS]):
         if pair.met[s]:
             continue
-        i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
+        i, j = bodies_of(model, state, s)
         # Not found although somebody is awake: it is open now, or one of them has left.
         if body.awake[i] or body.awake[j] or not (state.alive[i] and state.alive[j]):
             if state.pair_flags[s, 1]:
-                g = state.keys[s] % model.pair_gaps
+                g = state.keys[s] % model.most_pair_gaps
                 count = record(log, count, LOST, i, j, g, time + h, 0.0)
             continue
         state.keys[size], state.pair_release[size] = state.keys[s], time + 0.5 * h
@@ -204,16 +205,18 @@ def add_contacts(model, state, body, pair, block, event, begin, end, kept, share
             p = state.pair_impulse[size, 0]
             state.pair_action[size, a] = block.jacobian[b, 0, a] * p
             state.pair_action[size, k + a] = block.jacobian[b, 0, K + a] * p
-        for law in range(model.pair_laws):
-            f = b + 1 + law
+        family = family_of(model, block.bodies[b, 0], block.bodies[b, 1])
+        for law in range(model.first_law[family], model.first_law[family + 1]):
+            which = law - model.first_law[family]
+            f = b + 1 + which
             if sticks(model, body, block, f):
-                state.pair_flags[size, 0] |= ONE << law
+                state.pair_flags[size, 0] |= ONE << which
             one, two = ZERO, K
             if block.bodies[f, 0] != block.bodies[b, 0]:
                 one, two = K, ZERO
             for r in range(block.rows[f]):
                 p = block.impulse[f, r] * lasting
-                state.pair_impulse[size, 1 + model.pair_slip_start[law] + r] = p
+                state.pair_impulse[size, 1 + model.law_start[law] + r] = p
                 for a in range(k if model.may_rest else ZERO):
                     state.pair_action[size, a] += block.jacobian[f, r, one + a] * p
                     state.pair_action[size, k + a] += block.jacobian[f, r, two + a] * p

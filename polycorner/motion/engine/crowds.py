@@ -31,11 +31,12 @@ from polycorner.motion.engine.compact import (
 )
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import (
+    bodies_of,
+    component,
     detection_distance,
     heap_sort,
     key_of,
     nearest,
-    pair_of,
 )
 from polycorner.motion.engine.partition import is_pressed_by_former
 from polycorner.motion.engine.sizes import MOST_STRIPS
@@ -54,14 +55,11 @@ def is_crowd(model, first, last):
 
 @compiled
 def place_of(model, mid, i, axis):
-    """Return a component of a body's position, as a length; zero if there is only the other.
+    """Return a component of a body's position, as a length; zero if there is none.
 
     Where positions repeat it is between minus and plus half a period.
     """
-    c = model.position[axis]
-    if axis == 0 and model.position[1] == c:
-        return 0.0
-    return nearest(model, axis, mid.q[i, c] * model.units[c])
+    return nearest(model, axis, component(model, mid.q, i, axis))
 
 
 @compiled
@@ -253,9 +251,9 @@ def renew_ranks(model, state, manner, mid, neighbours, pair, index):
 def remember_contacts(model, state, pair):
     """Copy the contacts of the last step to where those of this step are going to be."""
     for s in range(state.counts[CONTACTS]):
-        i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
+        i, j = bodies_of(model, state, s)
         pair.contact[s, 0], pair.contact[s, 1] = i, j
-        pair.contact[s, 2] = state.keys[s] % model.pair_gaps
+        pair.contact[s, 2] = state.keys[s] % model.most_pair_gaps
         pair.gap[s] = state.pair_release[s]
         pair.before[s] = 2 * state.pair_flags[s, 0] + state.pair_flags[s, 1]
         for a in range(state.pair_impulse.shape[1]):

@@ -8,6 +8,7 @@ from polycorner.motion.engine.blocks import STRAIGHT
 from polycorner.motion.engine.bounds import equation_offset
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
+from polycorner.motion.engine.families import family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.partition import island_of
@@ -63,7 +64,7 @@ def correct_island(model, work, root, h):
             if i != first:
                 evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
             first, second = i, NONE
-            gap, following = work.mid.gap[i, g], ahead.gap[i, g]
+            gap, following = work.mid.gap[g], ahead.gap[g]
         else:
             j = block.bodies[b, 1]
             if body.speed[i] + body.speed[j] <= fast:
@@ -72,7 +73,7 @@ def correct_island(model, work, root, h):
                 evaluate_pair_gaps(model, scratch, i, j, ahead.q)
             first, second = i, j
             gap = work.pair.gap[block.origin[b, 1]]
-            following = scratch.values[model.pair_inputs + g]
+            following = scratch.values[pair_inputs(model, family_of(model, i, j)) + g]
         if block.bilateral[b]:
             if not model.follows_velocity and bend_equation(
                 model, body, block, b, gap, following, h, model.tolerance
@@ -151,12 +152,12 @@ def follow_curvature(model, state, work, blocks, h):
         if j < 0:
             if away:
                 evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
-            gap, following = mid.gap[i, g], ahead.gap[i, g]
+            gap, following = mid.gap[g], ahead.gap[g]
         else:
             if away:
                 evaluate_pair_gaps(model, scratch, i, j, ahead.q)
             gap = work.pair.gap[block.origin[b, 1]]
-            following = scratch.values[model.pair_inputs + g]
+            following = scratch.values[pair_inputs(model, family_of(model, i, j)) + g]
         first, second = i, j
         if block.bilateral[b]:
             changed = bend_equation(model, body, block, b, gap, following, h, share)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from polycorner.errors import SolverError
 from polycorner.formulas.tables import Layout
-from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.bodies import MovingBodies
 from polycorner.motion.engine.allocation import allocate, own_workspace, restored, workspace
 from polycorner.motion.engine.arrays import (
     CONTACTS,
@@ -63,14 +63,15 @@ class Effort:
 
 
 class Engine:
-    """Identical bodies in motion.
+    """Bodies in motion.
 
     Parameters
     ----------
-    bodies : IdenticalBodies
+    bodies : MovingBodies
     q, v : (N, k) array
-    sticking : (N, F) array of bool
-        Which friction contacts stick.
+        Zero beyond the coordinates of a body, where kinds have different numbers of them.
+    sticking : array of bool
+        Which friction contacts stick, body after body.
     dt : float
         Step, in s.
     start : float
@@ -81,7 +82,7 @@ class Engine:
 
     def __init__(
         self,
-        bodies: IdenticalBodies,
+        bodies: MovingBodies,
         q: Array,
         v: Array,
         sticking: NDArray[np.bool_],
@@ -92,12 +93,14 @@ class Engine:
         solver: Solver | None = None,
     ) -> None:
         self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
-        self.capacity = max(16, CONTACTS_PER_BODY * bodies.count)
+        self.capacity = max(16, CONTACTS_PER_BODY * bodies.total)
+        self._own = _own_contacts(bodies)
         self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start, self.dt)
         self.motion = allocate(EngineState, self._sizes)
-        self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, sticking
-        self.motion.rank[:] = self.motion.body_of_rank[:] = np.arange(bodies.count)
-        self.motion.touches[:, self.model.unilateral :] = 1
+        self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, np.ravel(sticking)
+        self.motion.rank[:] = self.motion.body_of_rank[:] = np.arange(bodies.total)
+        for first, end in zip(self.model.first_equation, self.model.first_gap[1:], strict=True):
+            self.motion.touches[first:end] = 1
         self._allocate()
 
     @property
@@ -145,7 +148,7 @@ class Engine:
     def advance(self, steps: int) -> EventTable:
         """Advance by so many steps and return the events in them."""
         # Compiles the engine, unless the cache has it.
-        advance = compiled_advance(self.bodies.dimension)
+        advance = compiled_advance(self.bodies.width)
         events: list[EventTable] = []
         while steps > 0:
             first, *others = self._addresses
@@ -164,10 +167,9 @@ class Engine:
 
     def _make_room(self) -> None:
         """Double the room for contacts, unless there was enough for all that there can be."""
-        pairs = self.bodies.count * (self.bodies.count - 1) // 2
-        if self.capacity >= 2 * pairs * len(
-            self.bodies.pair_contacts
-        ):  # those of sleepers are kept
+        pairs = self.bodies.total * (self.bodies.total - 1) // 2
+        # Twice, as those of sleepers are kept.
+        if self.capacity >= 2 * pairs * self.model.most_pair_gaps:
             msg = f"the step after t = {self.time:.6g} finds more contacts than there can be"
             raise SolverError(msg)
         self.capacity *= 2
@@ -183,12 +185,13 @@ class Engine:
 
     def _what_is_not_finite(self) -> str:
         """Return a sentence on why the next step cannot be computed."""
-        body, motion = self.bodies.body, self.motion
-        names = body.formulation.coordinates
-        parameters = self.model.parameters[: len(body.parameters)]  # with the time
-        for i in np.flatnonzero(motion.alive):
-            q, v = motion.q[i], motion.v[i]
-            which = f" of body {i}" if self.bodies.count > 1 else ""
+        bodies, motion = self.bodies, self.motion
+        for i in np.flatnonzero(motion.alive).tolist():
+            kind = bodies.kinds[bodies.kind_of[i]]
+            body, names = kind.body, kind.body.formulation.coordinates
+            parameters = self._parameters(int(bodies.kind_of[i]))
+            q, v = motion.q[i, : len(names)], motion.v[i, : len(names)]
+            which = f" of {bodies.name_of(i)}" if bodies.total > 1 else ""
             state = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, q, strict=True))
             where = f"{which} at t = {self.time:.6g}, {state}"
             middle = q + 0.5 * self.dt * v
@@ -198,15 +201,24 @@ class Engine:
             for name, force in zip(names, at.force, strict=True):
                 if not np.isfinite(force):
                     return f"the force on {name}{where} is {force}"
-            for name, gap in zip(body.contacts, self.work.mid.gap[i], strict=True):
+            gaps = self.work.mid.gap[slice(*self.model.first_gap[i : i + 2])]
+            for name, gap in zip(body.contacts, gaps, strict=True):
                 if np.isnan(gap):
                     return f"the gap {name!r}{where} is not a number"
         return f"the velocities after t = {self.time:.6g}, dt = {self.dt:.6g} later, are not finite"
 
+    def _parameters(self, kind: int) -> Array:
+        """Return the parameters of a kind's equations of motion, with the time."""
+        first = self.model.force_parameters[kind]
+        return self.model.parameters[first : first + len(self.bodies.kinds[kind].body.parameters)]
+
     def _read(self, count: int) -> EventTable:
         whole, numbers = self.log.entries[:count].copy(), self.log.numbers[:count].copy()
-        between = (whole[:, 2] >= 0) & (whole[:, 3] >= 0)
-        whole[between, 3] += len(self.bodies.body.contacts)
+        of_pair = (whole[:, 2] >= 0) & (whole[:, 3] >= 0)
+        own = (whole[:, 2] < 0) & (whole[:, 3] >= 0)
+        whole[own, 3] = self._own[whole[own, 3]]
+        i, j, g = whole[of_pair, 1:].T
+        whole[of_pair, 3] = self._between(i, j, g)
         numbers[:, 0] += self.start
         return EventTable(whole, numbers, self.bodies.contact_names)
 
@@ -216,7 +228,7 @@ class Engine:
 
     def load(self, arrays: dict[str, Any]) -> None:
         """Continue, bit for bit, from arrays saved before, with at least as much room."""
-        order = np.arange(self.bodies.count)  # that of states saved before bodies had ranks
+        order = np.arange(self.bodies.total)  # that of states saved before bodies had ranks
         arrays = {"rank": order, "body_of_rank": order, **arrays}
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
@@ -234,26 +246,55 @@ class Engine:
         return float(self._energies()[body].sum())
 
     def _energies(self) -> Array:
-        kernel = self.bodies.body.formulation.energies.kernel
-        at = np.concatenate([self.motion.q, self.motion.v], axis=1)
-        (values,) = kernel.over(at, self.model.parameters.ctypes.data, 0)
-        return values
+        found = []
+        for a, (kind, at) in enumerate(self.bodies.slices):
+            k, kernel = kind.dimension, kind.body.formulation.energies.kernel
+            state = np.concatenate([self.motion.q[at, :k], self.motion.v[at, :k]], axis=1)
+            # Up to the end: kernels of bodies without parameters read one number as well.
+            known = self.model.parameters[self.model.force_parameters[a] :]
+            (values,) = kernel.over(state, known.ctypes.data, 0)
+            found.append(values)
+        return np.concatenate(found)
 
     def touching(self) -> list[tuple[tuple[int, ...], str, float]]:
         """Return the contacts that touch, and all equations: bodies, name, and normal force."""
-        motion, h = self.motion, self.dt
+        motion, h, names = self.motion, self.dt, self.bodies.contact_names
+        touching = np.flatnonzero(motion.touches)
+        of_gap = np.searchsorted(self.model.first_gap, touching, side="right") - 1
         own: list[tuple[tuple[int, ...], str, float]] = [
-            ((int(i),), self.bodies.body.contacts[g], float(motion.normal[i, g]) / h)
-            for i, g in np.argwhere(motion.touches != 0)
+            ((int(i),), names[self._own[g]], float(motion.normal[g]) / h)
+            for i, g in zip(of_gap.tolist(), touching.tolist(), strict=True)
             if motion.alive[i]
         ]
-        names = self.bodies.pair_contacts
-        for s in np.flatnonzero(motion.pair_flags[: int(motion.counts[CONTACTS]), 1]):
-            pair, g = divmod(int(motion.keys[s]), len(names))
-            ranks = np.array(divmod(pair, self.bodies.count))
-            bodies = tuple(sorted(motion.body_of_rank[ranks].tolist()))
-            own.append((bodies, names[g], float(motion.pair_impulse[s, 0]) / h))
-        return own
+        pairs = np.flatnonzero(motion.pair_flags[: int(motion.counts[CONTACTS]), 1])
+        keys, gaps = np.divmod(motion.keys[pairs], max(1, self.model.most_pair_gaps))
+        ranks = np.stack(np.divmod(keys, self.bodies.total))
+        first, second = np.sort(motion.body_of_rank[ranks], axis=0)
+        forces = (motion.pair_impulse[pairs, 0] / h).tolist()
+        which = self._between(first, second, gaps).tolist()
+        bodies = zip(first.tolist(), second.tolist(), strict=True)
+        return own + [
+            (two, names[c], force) for two, c, force in zip(bodies, which, forces, strict=True)
+        ]
+
+    def _between(
+        self, i: NDArray[np.int64], j: NDArray[np.int64], gaps: NDArray[np.int64]
+    ) -> NDArray[np.int64]:
+        """Return the numbers of contacts between bodies among the names of all."""
+        bodies, known = self.bodies, self.bodies.contact_names
+        table = np.zeros((self.model.families, self.model.most_pair_gaps), dtype=np.int64)
+        for row, family in zip(table, bodies.families.values(), strict=True):
+            row[: len(family.gaps.names)] = [known.index(name) for name in family.gaps.names]
+        return table[self.model.family[bodies.kind_of[i], bodies.kind_of[j]], gaps]
+
+
+def _own_contacts(bodies: MovingBodies) -> NDArray[np.int64]:
+    """Return for the gaps between all bodies and their surroundings the numbers of their names."""
+    known, found = bodies.contact_names, [np.empty(0, dtype=np.int64)]
+    for kind in bodies.kinds:
+        every = np.array([known.index(name) for name in kind.body.contacts], dtype=np.int64)
+        found.append(np.tile(every, kind.count))
+    return np.concatenate(found)
 
 
 def _table_of(record: Any) -> NDArray[np.int64]:

@@ -96,7 +96,7 @@ def imbalance(model, mid, velocity, block, matrix, first, last, n):
             value = 0.0
             for a in range(k):
                 value += mid.inverse_mass[i, c, a] * x[at * K + a]
-            far = max(far, abs(value) * model.units[c])
+            far = max(far, abs(value) * model.units[model.kind[i], c])
     return far
 
 

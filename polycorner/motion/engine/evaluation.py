@@ -4,6 +4,7 @@ import numpy as np
 
 from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import CHANGED, SETTLED
+from polycorner.motion.engine.families import family_of, pair_inputs
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
 
@@ -60,16 +61,18 @@ def evaluate_forces(model, mid, scratch, i, v, h, mass):
 
     Return where its loads are in values.
     """
-    k, values = model.dimension, scratch.values
+    kind, values = model.kind[i], scratch.values
+    k = model.coordinates[kind]
     for c in range(k):
         values[c] = mid.q[i, c]
         values[k + c] = v[i, c]
     start, base = values.ctypes.data, model.parameters.ctypes.data
+    known = base + 8 * model.force_parameters[kind]
     f0 = 2 * k
-    call_kernel(model.force_kernel, start, base, start + 8 * f0, start, start)
+    call_kernel(model.force_kernel[kind], start, known, start + 8 * f0, start, start)
     upper = k * (k + 1) // 2
     # A constant mass matrix is inverted once: its first entry tells that this was done.
-    if mass and not (model.constant_mass and mid.mass[i, 0, 0] > 0.0):
+    if mass and not (model.constant_mass[kind] and mid.mass[i, 0, 0] > 0.0):
         invert(values, f0, k, mid.mass[i], mid.inverse_mass[i])
     at = f0 + upper
     for c in range(k):
@@ -88,37 +91,37 @@ def random_impulse(model, i, c, h, time, index):
     if model.kick_time > 0.0:
         begin, end = time - 0.5 * h, time + 0.5 * h
         drawn = held_integral(model.seed, model.kick_time, begin, end, i, KICK + c)
-        return model.kicks[c] / np.sqrt(model.kick_time) * drawn
+        return model.kicks[model.kind[i], c] / np.sqrt(model.kick_time) * drawn
     draw = gaussian(model.seed, index, i, KICK + c) * (h / model.step)
-    return model.kicks[c] * np.sqrt(model.step) * draw
+    return model.kicks[model.kind[i], c] * np.sqrt(model.step) * draw
 
 
 @compiled
 def evaluate_body(model, state, mid, scratch, i, h, time, index):
     """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
-    k, F, values = model.dimension, model.frictions, scratch.values
+    k, kind, values = model.dimension, model.kind[i], scratch.values
     for c in range(k):
         mid.q[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         mid.kick[i, c] = 0.0
-        if model.kicks[c] > 0.0:
+        if model.kicks[kind, c] > 0.0:
             mid.kick[i, c] = random_impulse(model, i, c, h, time, index)
     # Before forces are evaluated, since these depend on the midpoint.
-    if model.unilateral < model.restitution.size:
+    if model.first_equation[i] < model.first_gap[i + 1]:
         approach_equations(model, mid, scratch, i)
     at = evaluate_forces(model, mid, scratch, i, state.v, h, True)
     if model.chatter > 0.0:
         when = np.int64(np.floor(time / model.correlation_time))
-        for j in range(model.loads):
+        for j in range(model.loads[kind]):
             # Drawn by the number of the interval, so that parts of a step and runs that resume meet
             # the same noise.
             factor = 1.0 + model.chatter * gaussian(model.seed, when, i, j)
             values[at + j] *= max(0.0, factor)
-    for f in range(F):
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
         load = 0.0
-        for j in range(model.loads):
+        for j in range(model.loads[kind]):
             if model.load_sources[f, j]:
                 load += values[at + j]
-        mid.load[i, f] = max(0.0, h * load)
+        mid.load[f] = max(0.0, h * load)
     evaluate_slips(model, state, mid, scratch, i)
     evaluate_gaps(model, scratch, i, mid.q, mid.gap, mid.gradient)
 
@@ -128,7 +131,8 @@ def evaluate_slips(model, state, mid, scratch, i):
     """Evaluate the slips of a body at the midpoint: derivatives by velocities, and what is left."""
     k, values = model.dimension, scratch.values
     start, base = values.ctypes.data, model.parameters.ctypes.data
-    for call in range(model.slip_kernels):
+    kind, first = model.kind[i], model.slip_start[model.first_friction[i]]
+    for call in range(model.first_slip_call[kind], model.first_slip_call[kind + 1]):
         address, n, m = (
             model.slip_calls[call, 0],
             model.slip_calls[call, 1],
@@ -141,24 +145,24 @@ def evaluate_slips(model, state, mid, scratch, i):
         j0 = n + m
         call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
         for o in range(m):
-            r = model.slip_places[w0 + o]
             # Kernels shared by several contacts have outputs that this body does not use.
-            if r < 0:
+            if model.slip_places[w0 + o] < 0:
                 continue
+            r = first + model.slip_places[w0 + o]
             value = values[n + o]
             size = abs(value)
             for c in range(k):
-                mid.slip_rows[i, r, c] = 0.0
+                mid.slip_rows[r, c] = 0.0
             for a in range(n):
                 c = model.slip_reads[r0 + a] - k
                 if c >= 0:
                     slope = values[j0 + o * n + a]
-                    mid.slip_rows[i, r, c] = slope
+                    mid.slip_rows[r, c] = slope
                     value -= slope * state.v[i, c]
                     size += abs(slope * state.v[i, c])
             # What cancels up to rounding is zero: otherwise a body on a substrate that rests would
             # creep, and never sleep.
-            mid.slip_offset[i, r] = value if abs(value) > 1e-14 * size else 0.0
+            mid.slip_offset[r] = value if abs(value) > 1e-14 * size else 0.0
 
 
 @compiled
@@ -169,7 +173,8 @@ def approach_equations(model, mid, scratch, i):
     Gauss and Newton's, of least length in scaled coordinates; equations may be redundant.
     """
     never_inline()
-    k, A, x = model.dimension, scratch.matrix, scratch.vector
+    kind, A, x = model.kind[i], scratch.matrix, scratch.vector
+    k, units = model.coordinates[kind], model.units[kind]
     for _ in range(MOST_APPROACHES):
         evaluate_gaps(model, scratch, i, mid.q, mid.gap, mid.gradient)
         worst = 0.0
@@ -178,17 +183,17 @@ def approach_equations(model, mid, scratch, i):
             for a in range(k):
                 # The small weight of the change makes the matrix definite where equations are
                 # redundant, and the step the shortest one otherwise.
-                A[c, a] = BENDING * model.units[c] ** 2 if a == c else 0.0
-        for g in range(model.unilateral, model.restitution.size):
-            row, size = mid.gradient[i, g], 0.0
+                A[c, a] = BENDING * units[c] ** 2 if a == c else 0.0
+        for g in range(model.first_equation[i], model.first_gap[i + 1]):
+            row, size = mid.gradient[g], 0.0
             for c in range(k):
-                size += (row[c] / model.units[c]) ** 2
+                size += (row[c] / units[c]) ** 2
             if size > 0.0:
-                worst = max(worst, abs(mid.gap[i, g]) / np.sqrt(size))
+                worst = max(worst, abs(mid.gap[g]) / np.sqrt(size))
                 # Rows have unit length in scaled coordinates, so that all equations weigh the same.
                 add_square(A, row, 1.0 / size, k)
                 for c in range(k):
-                    x[c] -= mid.gap[i, g] / size * row[c]
+                    x[c] -= mid.gap[g] / size * row[c]
         if not worst > ON_EQUATIONS or not solve_spd(A, x, k):
             return
         for c in range(k):
@@ -227,8 +232,9 @@ def update_forces(model, state, work, h):
             for a in range(k):
                 difference = mid.force[i, a] - body.former_force[i, a]
                 value += mid.inverse_mass[i, c, a] * difference
-            change = max(change, abs(value) * model.units[c])
-            speed += (abs(velocity.new[i, c]) + abs(state.v[i, c])) * model.units[c]
+            unit = model.units[model.kind[i], c]
+            change = max(change, abs(value) * unit)
+            speed += (abs(velocity.new[i, c]) + abs(state.v[i, c])) * unit
         # As a change of velocity, not of force: what it means depends on the mass.
         if change > settled(model, body, i) * speed:
             island.stage[root] = CHANGED
@@ -242,7 +248,8 @@ def evaluate_gaps(model, scratch, i, q, gap, gradient):
     """Evaluate the gaps between a body and its surroundings, and their gradients."""
     values = scratch.values
     start, base = values.ctypes.data, model.parameters.ctypes.data
-    for call in range(model.gap_kernels):
+    kind, first = model.kind[i], model.first_gap[i]
+    for call in range(model.first_gap_call[kind], model.first_gap_call[kind + 1]):
         address, n, m = model.gap_calls[call, 0], model.gap_calls[call, 1], model.gap_calls[call, 2]
         r0, w0, p0 = model.gap_calls[call, 3], model.gap_calls[call, 4], model.gap_calls[call, 5]
         for a in range(n):
@@ -250,13 +257,13 @@ def evaluate_gaps(model, scratch, i, q, gap, gradient):
         j0 = n + m
         call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
         for o in range(m):
-            g = model.gap_places[w0 + o]
-            if g >= 0:
-                gap[i, g] = values[n + o]
+            if model.gap_places[w0 + o] >= 0:
+                g = first + model.gap_places[w0 + o]
+                gap[g] = values[n + o]
                 for c in range(model.dimension):
-                    gradient[i, g, c] = 0.0
+                    gradient[g, c] = 0.0
                 for a in range(n):
-                    gradient[i, g, model.gap_reads[r0 + a]] += values[j0 + o * n + a]
+                    gradient[g, model.gap_reads[r0 + a]] += values[j0 + o * n + a]
 
 
 @compiled
@@ -265,24 +272,25 @@ def evaluate_pair(model, scratch, a, b, q):
 
     The scratch array gets the coordinates that the gaps read, the gaps, and their gradients.
     """
-    call_pair_kernel(model, scratch, model.pair_kernel, a, b, q)
+    call_pair_kernel(model, scratch, model.pair_kernel[family_of(model, a, b)], a, b, q)
 
 
 @compiled
 def evaluate_pair_gaps(model, scratch, a, b, q):
     """Evaluate the gaps of a pair of bodies alone, where :func:`evaluate_pair` leaves them."""
-    call_pair_kernel(model, scratch, model.pair_values, a, b, q)
+    call_pair_kernel(model, scratch, model.pair_values[family_of(model, a, b)], a, b, q)
 
 
 @compiled
 def call_pair_kernel(model, scratch, kernel, a, b, q):
     """Call a kernel for two bodies."""
-    values, n, m = scratch.values, model.pair_inputs, model.pair_gaps
+    values, family = scratch.values, family_of(model, a, b)
+    first, n, m = model.first_read[family], pair_inputs(model, family), model.pair_gaps[family]
     start, base = values.ctypes.data, model.parameters.ctypes.data
     for r in range(n):
-        body = a if model.pair_reads[r, 0] == 0 else b
-        values[r] = q[body, model.pair_reads[r, 1]]
-    j0, p0 = n + m, model.pair_parameters
+        body = a if model.pair_reads[first + r, 0] == 0 else b
+        values[r] = q[body, model.pair_reads[first + r, 1]]
+    j0, p0 = n + m, model.pair_parameters[family]
     call_kernel(kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
 
 
@@ -296,7 +304,7 @@ def start_body(model, state, work, i):
     mid, velocity, body, island = work.mid, work.velocity, work.body, work.island
     if not state.alive[i] or island.stage[island.parent[i]] == SETTLED:
         return
-    k, finite, speed = model.dimension, True, 0.0
+    k, kind, finite, speed = model.dimension, model.kind[i], True, 0.0
     for c in range(k):
         value = state.v[i, c]
         if body.awake[i]:
@@ -309,16 +317,17 @@ def start_body(model, state, work, i):
     for c in range(k):
         # Speeds are relative to the substrate: a body carried along at rest has none, and
         # tolerances are multiples of speeds.
-        carried = model.substrate_speed / model.units[c] if c == model.position[0] else 0.0
-        before = abs(state.v[i, c] - carried) * model.units[c]
-        speed += max(before, abs(velocity.free[i, c] - carried) * model.units[c])
+        unit, moves = model.units[kind, c], c == model.substrate_coordinate[kind]
+        carried = model.substrate_speed / unit if moves else 0.0
+        before = abs(state.v[i, c] - carried) * unit
+        speed += max(before, abs(velocity.free[i, c] - carried) * unit)
     body.speed[i], body.island_speed[i] = speed, speed
     body.touched[i] = 0
     # Only crowds move bodies apart; nobody reads this array otherwise.
     for c in range(k if model.crowd_sweeps > 0 else 0):
         work.crowd.shift[i, c] = 0.0
-    for g in range(model.restitution.size):
+    for g in range(model.first_gap[i], model.first_gap[i + 1]):
         # An infinite gap is far; one that is not a number would pass all comparisons as open.
-        finite = finite and not np.isnan(mid.gap[i, g])
+        finite = finite and not np.isnan(mid.gap[g])
     if not finite:
         work.shared.finite[0] = 0

@@ -273,7 +273,7 @@ def rests(model, state, work, first, last, speed):
             if not find_rest_velocity(model, mid, scratch, state.normal, i, rest):
                 return False
             for c in range(k):
-                far = abs(velocity.new[i, c] - rest[c]) * model.units[c]
+                far = abs(velocity.new[i, c] - rest[c]) * model.units[model.kind[i], c]
                 # A body that was not at rest may be stopped only where it hardly moves: rest must
                 # not swallow a motion.
                 if not state.rests[i] and far > SLOW * speed:
@@ -313,7 +313,7 @@ def loses_grip(model, state, body, block, first, last, i, solved):
             return False
         if block.origin[b, 0] != OWN_FRICTION or load_on(block, b) <= 0.0:
             continue
-        if not state.sticks[i, block.origin[b, 2]]:
+        if not state.sticks[block.origin[b, 2]]:
             return False
         slips = slips or not solved or not sticks(model, body, block, b)
     return slips
@@ -325,7 +325,7 @@ def find_grip_velocity(model, velocity, block, scratch, first, last, i):
 
     It is that of least squares; :func:`find_equilibrium` checks that nothing slips at it.
     """
-    k, A, x = model.dimension, scratch.matrix, scratch.rest_velocity
+    k, A, x = model.coordinates[model.kind[i]], scratch.matrix, scratch.rest_velocity
     for c in range(k):
         x[c] = 0.0
         for a in range(k):

@@ -197,11 +197,12 @@ def assemble_mass(model, mid, matrix, n, weight):
         store(A, at, zeros())
     for p in range(n):
         i = matrix.members[p]
+        own = model.coordinates[model.kind[i]]
         for x in range(K):
             line = (p * K + x) * K
             # Unused lanes have equations of their own, 1 x = 0: the elimination needs no exception
             # for them.
-            if x >= k:
+            if x >= own:
                 A[line + x] = 1.0
                 continue
             for c in range(0, K, WIDTH):

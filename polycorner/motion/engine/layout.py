@@ -7,7 +7,7 @@ import numpy as np
 
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.families import Family
-from polycorner.motion.bodies import IdenticalBodies, MovingBody
+from polycorner.motion.bodies import IdenticalBodies, MovingBodies, MovingBody
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.allocation import filled
 from polycorner.motion.engine.arrays import Model
@@ -15,6 +15,7 @@ from polycorner.motion.engine.sizes import EVENTS, Sizes
 from polycorner.motion.engine.threads import address_of_yield
 from polycorner.motion.formulation import moment
 from polycorner.motion.noise import MotionOptions, Noise, Solver
+from polycorner.spaces.manifold import Array
 
 MANY = 32  # bodies beyond which all are a crowd: parts of a step cost a look at each body
 # Of the options: lengths, which are scaled by the unit of gaps, and others.
@@ -23,7 +24,7 @@ SHARES = ("bending", "slow_bounce", "shortest_part", "dependent")
 
 
 def model_of(
-    bodies: IdenticalBodies,
+    bodies: MovingBodies,
     sizes: Sizes,
     noise: Noise,
     solver: Solver,
@@ -31,36 +32,48 @@ def model_of(
     step: float,
 ) -> Model:
     """Return the model constants of bodies in motion."""
-    body, formulation, options = bodies.body, bodies.body.formulation, solver.options
-    parameters = list(body.parameters)
-    sets, dependence = _Sets(), _dependence(body)
-    if solver.crowd_sweeps and body.equations and not dependence["constant_mass"]:
+    options, sets, parameters = solver.options, _Sets(), list[float]()
+    dependence = [_dependence(kind.body) for kind in bodies.kinds]
+    laws = [kind.body.formulation for kind in bodies.kinds]
+    if solver.crowd_sweeps and any(
+        kind.body.equations and not known["constant_mass"]
+        for kind, known in zip(bodies.kinds, dependence, strict=True)
+    ):
         msg = (
             f"solver: expected crowd_sweeps=0 for bodies that turn in space and are no balls, or "
             f"obey equations and have a mass matrix that varies: sweeps do not follow their "
             f"rotation; got {solver.crowd_sweeps}"
         )
         raise NotImplementedError(msg)
+    units, kicks = np.ones((sizes.A, sizes.k)), np.zeros((sizes.A, sizes.k))
+    for a, kind in enumerate(bodies.kinds):
+        names = kind.body.formulation.coordinates
+        units[a, : kind.dimension] = kind.body.units
+        kicks[a, : kind.dimension] = [noise.kicks.get(name, 0.0) for name in names]
     values = {
-        "bodies": bodies.count,
-        "dimension": bodies.dimension,
+        "bodies": sizes.N,
+        "kind": bodies.kind_of,
+        "dimension": sizes.k,
         "lanes": sizes.K,
         **dict.fromkeys(("contact_room", "neighbour_room"), 0),  # not yet known
         "event_room": EVENTS,
-        "force_kernel": formulation.forces.kernel.compiled(0).point,
-        "loads": formulation.loads,
-        "units": body.units,
-        "position": bodies.position,
-        "period": bodies.period,
+        "coordinates": [kind.dimension for kind in bodies.kinds],
+        "force_kernel": [law.forces.kernel.compiled(0).point for law in laws],
+        "loads": [law.loads for law in laws],
+        "position": [kind.axes for kind in bodies.kinds],
+        "substrate_coordinate": [kind.position[0] for kind in bodies.kinds],
+        "exit_coordinate": [kind.exit_coordinate for kind in bodies.kinds],
+        "exit_limit": [kind.exit_limit for kind in bodies.kinds],
+        "constant_mass": [known["constant_mass"] for known in dependence],
+        "follows_velocity": any(known["follows_velocity"] for known in dependence),
+        "units": units,
+        "kicks": kicks,
+        "period": (*bodies.period, np.inf)[:3],
         "substrate_speed": bodies.substrate_speed,
-        "exit_coordinate": bodies.exit_coordinate,
-        "exit_limit": bodies.exit_limit,
-        "restitution": body.restitution,
-        "unilateral": len(body.contacts) - body.equations,
-        "gap_unit": body.gap_unit,
+        "equations": sum(kind.count * kind.body.equations for kind in bodies.kinds),
+        "gap_unit": bodies.gap_unit,
         "chatter": noise.chatter,
         "correlation_time": noise.correlation_time,
-        "kicks": [noise.kicks.get(name, 0.0) for name in formulation.coordinates],
         "kick_time": noise.kick_time,
         "seed": noise.seed,
         "tolerance": solver.tolerance,
@@ -69,32 +82,38 @@ def model_of(
         "crowd_sweeps": solver.crowd_sweeps,
         "threads": solver.threads,
         "give_way": address_of_yield(),
-        "may_rest": sizes.m + sizes.R >= sizes.k,
+        "may_rest": any(_may_rest(kind) for kind in bodies.kinds),
+        "follows_time": any(
+            law.time_parameter >= 0 and not kind.body.slow_signals
+            for kind, law in zip(bodies.kinds, laws, strict=True)
+        ),
         **{name: getattr(options, name) for name in SHARES},
-        **{name: getattr(options, name) * body.gap_unit for name in LENGTHS},
+        **{name: getattr(options, name) * bodies.gap_unit for name in LENGTHS},
         **_near(bodies, noise, options),
         "start": start,
         "step": step,
-        "time_parameter": body.formulation.time_parameter,
-        "follows_time": body.formulation.time_parameter >= 0 and not body.slow_signals,
-        **dependence,
-        **_signals(body, parameters),
-        **_friction(bodies, sets),
-        **_calls("slip", formulation.slip_calls, parameters, formulation.slip),
-        **_calls("gap", body.gaps, parameters),
+        **_surroundings(bodies, sets, sizes),
+        **_kernels(bodies, parameters, sizes.k),
         **_pairs(bodies, parameters, sets),
         **sets.values(),
     }
     return filled(Model, sizes, {**values, "parameters": [*parameters, 0.0]})
 
 
-def _near(bodies: IdenticalBodies, noise: Noise, options: MotionOptions) -> dict[str, float]:
+def _may_rest(kind: IdenticalBodies) -> bool:
+    """Return whether surroundings alone can hold a body of a kind."""
+    rows = sum(contact.rows for contact in kind.body.friction)
+    return len(kind.body.contacts) + rows >= kind.dimension
+
+
+def _near(bodies: MovingBodies, noise: Noise, options: MotionOptions) -> dict[str, float]:
     """Return the scaled travel in a step up to which a plastic impact is slow, and in a crowd."""
     kicked = any(noise.kicks.values())
     near = many = options.slow_travel_kicked if kicked else options.slow_travel
-    if bodies.contacts is not None and bodies.count > 1:
-        many = max(near, options.crowd_travel * bodies.contacts.reach / bodies.body.gap_unit)
-        near = near if bodies.count <= MANY else many
+    if bodies.families:
+        least = min(family.reach for family in bodies.families.values())
+        many = max(near, options.crowd_travel * least / bodies.gap_unit)
+        near = near if bodies.total <= MANY else many
     return {"near": near, "near_many": many}
 
 
@@ -114,97 +133,154 @@ def _dependence(body: MovingBody) -> dict[str, bool]:
     }
 
 
-def _signals(body: MovingBody, parameters: list[float]) -> dict[str, int]:
-    """Return the entries of the functions of the time; their parameters are appended."""
-    if body.signals is None:
-        return {"signal_kernel": 0, "signal_parameters": 0}
-    first = len(parameters)
-    parameters += body.signal_parameters.tolist()
-    return {"signal_kernel": body.signals.kernel.compiled(0).point, "signal_parameters": first}
-
-
-def _friction(bodies: IdenticalBodies, sets: "_Sets") -> dict[str, Any]:
-    """Return the entries of the friction contacts between a body and its surroundings."""
-    contacts, formulation = bodies.body.friction, bodies.body.formulation
-    sources = np.zeros((len(contacts), max(1, formulation.loads)))
-    for source, contact in zip(sources, contacts, strict=True):
-        source[list(contact.loads)] = 1
+def _surroundings(bodies: MovingBodies, sets: "_Sets", sizes: Sizes) -> dict[str, Any]:
+    """Return the entries of contacts and friction between bodies and their surroundings."""
+    gaps, frictions, rows = [0], [0], [0]
+    equations: list[int] = []
+    friction: list[tuple[int, int, int]] = []  # of all bodies: sets, and cause
+    pressing: list[int] = []
+    sources: list[Array] = []
+    for kind in bodies.kinds:
+        contacts, m = kind.body.friction, len(kind.body.contacts)
+        each = [
+            (sets.add(c.static), sets.add(c.dynamic), bodies.causes.index(c.cause))
+            for c in contacts
+        ]
+        source = np.zeros((len(contacts), sizes.L))
+        for row, contact in zip(source, contacts, strict=True):
+            row[list(contact.loads)] = 1
+        friction += kind.count * each
+        sources += kind.count * [source]
+        for _ in range(kind.count):
+            pressing += [gaps[-1] + c.gap if c.gap >= 0 else -1 for c in contacts]
+            rows += [c.rows for c in contacts]
+            gaps.append(gaps[-1] + m)
+            equations.append(gaps[-1] - kind.body.equations)
+            frictions.append(frictions[-1] + len(contacts))
+    known = np.array(friction, dtype=np.int64).reshape(-1, 3)
     return {
-        "frictions": len(contacts),
-        "slip_start": np.cumsum([0, *(contact.rows for contact in contacts)]),
-        "friction_sets": [[sets.add(c.static), sets.add(c.dynamic)] for c in contacts],
-        "pressing_gap": [contact.gap for contact in contacts],
-        "load_sources": sources,
-        "friction_causes": [bodies.causes.index(contact.cause) for contact in contacts],
+        "first_gap": gaps,
+        "first_equation": equations,
+        "restitution": np.concatenate(
+            [np.tile(kind.body.restitution, kind.count) for kind in bodies.kinds]
+        ),
+        "first_friction": frictions,
+        "slip_start": np.cumsum(rows),
+        "friction_sets": known[:, :2],
+        "friction_causes": known[:, 2],
+        "pressing_gap": pressing,
+        "load_sources": np.concatenate(sources),
     }
 
 
-def _calls(
-    what: str, calls: Sequence[Call], parameters: list[float], own: Family | None = None
-) -> dict[str, Any]:
-    """Return the entries of a body's gaps or slips; their parameters are appended.
-
-    Those of the family ``own`` are the first ones.
-    """
-    table: list[tuple[int, ...]] = []
-    reads: list[int] = []
-    places: list[int] = []
-    for call in calls:
-        kernel = call.family.kernel
-        if len(set(call.columns)) != len(call.columns):
-            msg = "polyhedron: expected each gap once; got one that occurs twice"
-            raise ValueError(msg)
-        row_of = dict(zip(call.columns, call.rows, strict=True))
-        entry = (kernel.compiled(1).point, kernel.variables, kernel.outputs)
-        first = 0 if call.family is own else len(parameters)
-        table.append((*entry, len(reads), len(places), first))
-        reads += call.reads
-        places += [row_of.get(column, -1) for column in range(kernel.outputs)]
-        parameters += call.parameters.tolist()
-    return {
-        f"{what}_kernels": len(table),
-        f"{what}_calls": table,
-        f"{what}_reads": [*reads, 0],
-        f"{what}_places": [*places, 0],
+def _kernels(bodies: MovingBodies, parameters: list[float], width: int) -> dict[str, Any]:
+    """Return the entries of the kernels of all kinds; their parameters are appended."""
+    found: dict[str, list[int]] = {
+        name: []
+        for name in ("force_parameters", "time_parameter", "signal_kernel", "signal_parameters")
     }
+    slips, gaps = _Calls("slip"), _Calls("gap")
+    for kind in bodies.kinds:
+        body, law, first = kind.body, kind.body.formulation, len(parameters)
+        parameters += body.parameters.tolist()
+        at = law.time_parameter
+        found["force_parameters"].append(first)
+        found["time_parameter"].append(first + at if at >= 0 else -1)
+        found["signal_parameters"].append(len(parameters))
+        signals = body.signals
+        found["signal_kernel"].append(0 if signals is None else signals.kernel.compiled(0).point)
+        parameters += body.signal_parameters.tolist()
+        # Kernels read velocities after all coordinates for which there is room.
+        shift = width - kind.dimension
+        places = [c if c < kind.dimension else c + shift for c in range(2 * kind.dimension)]
+        slips.add(law.slip_calls, parameters, places, law.slip, first)
+        gaps.add(body.gaps, parameters, places)
+    return {**found, **slips.values(), **gaps.values()}
 
 
-def _pairs(bodies: IdenticalBodies, parameters: list[float], sets: "_Sets") -> dict[str, Any]:
+class _Calls:
+    """The kernels of gaps or slips, kind after kind."""
+
+    def __init__(self, what: str) -> None:
+        self.what, self.first = what, [0]
+        self.table: list[tuple[int, ...]] = []
+        self.reads: list[int] = []
+        self.places: list[int] = []
+
+    def add(
+        self,
+        calls: Sequence[Call],
+        parameters: list[float],
+        places: Sequence[int],
+        own: Family | None = None,
+        start: int = 0,
+    ) -> None:
+        """Add the calls of a kind; their parameters are appended.
+
+        Those of the family ``own`` begin at ``start``.
+        """
+        for call in calls:
+            kernel = call.family.kernel
+            if len(set(call.columns)) != len(call.columns):
+                msg = "polyhedron: expected each gap once; got one that occurs twice"
+                raise ValueError(msg)
+            row_of = dict(zip(call.columns, call.rows, strict=True))
+            entry = (kernel.compiled(1).point, kernel.variables, kernel.outputs)
+            first = start if call.family is own else len(parameters)
+            self.table.append((*entry, len(self.reads), len(self.places), first))
+            self.reads += [places[c] for c in call.reads]
+            self.places += [row_of.get(column, -1) for column in range(kernel.outputs)]
+            parameters += call.parameters.tolist()
+        self.first.append(len(self.table))
+
+    def values(self) -> dict[str, Any]:
+        """Return the entries."""
+        return {
+            f"first_{self.what}_call": self.first,
+            f"{self.what}_calls": self.table,
+            f"{self.what}_reads": [*self.reads, 0],
+            f"{self.what}_places": [*self.places, 0],
+        }
+
+
+def _pairs(bodies: MovingBodies, parameters: list[float], sets: "_Sets") -> dict[str, Any]:
     """Return the entries of the contacts between bodies; their parameters are appended."""
-    family = bodies.contacts
-    if family is None or bodies.count < 2:
-        numbers = (
-            "pair_kernel",
-            "pair_values",
-            "pair_parameters",
-            "pair_inputs",
-            "pair_gaps",
-            "pair_laws",
-            "pair_restitution",
-        )
-        tables = ("pair_reads", "pair_slips", "pair_sets", "pair_causes")
-        empty: dict[str, Any] = dict.fromkeys(tables, ())
-        return {**dict.fromkeys(numbers, 0), "reach": 0.0, **empty, "pair_slip_start": [0]}
-    first = len(parameters)
-    parameters += family.parameters
-    slips = []
-    for slip, exchanged, values in family.slips:
-        slips.append((slip.kernel.compiled(1).point, exchanged, len(parameters)))
-        parameters += values
+    families = [*bodies.families.values()]
+    family = np.full((len(bodies.kinds), len(bodies.kinds)), -1)
+    for number, (a, b) in enumerate(bodies.families):
+        family[a, b] = family[b, a] = number
+    first: list[int] = []
+    slips: list[tuple[int, bool, int]] = []
+    first_slip: list[int] = []
+    for one in families:
+        first.append(len(parameters))
+        parameters += one.parameters
+        first_slip.append(len(slips))
+        for slip, exchanged, values in one.slips:
+            slips.append((slip.kernel.compiled(1).point, exchanged, len(parameters)))
+            parameters += values
+    laws = [law for one in families for law in one.laws]
+    starts = [np.cumsum([0, *(law.rows for law in one.laws)])[:-1] for one in families]
     return {
-        "pair_kernel": family.gaps.kernel.compiled(1).point,
-        "pair_values": family.gaps.kernel.compiled(0).point,
+        "families": len(families),
+        "family": family,
+        "pair_kernel": [one.gaps.kernel.compiled(1).point for one in families],
+        "pair_values": [one.gaps.kernel.compiled(0).point for one in families],
         "pair_parameters": first,
-        "pair_inputs": len(family.reads),
-        "pair_reads": family.reads,
-        "pair_gaps": len(family.gaps.names),
-        "pair_laws": len(family.laws),
+        "first_read": np.cumsum([0, *(len(one.reads) for one in families)]),
+        "pair_reads": [read for one in families for read in one.reads],
+        "pair_gaps": [len(one.gaps.names) for one in families],
+        "most_pair_gaps": max((len(one.gaps.names) for one in families), default=0),
+        "first_law": np.cumsum([0, *(len(one.laws) for one in families)]),
+        "first_pair_slip": first_slip,
         "pair_slips": slips,
-        "pair_slip_start": np.cumsum([0, *(law.rows for law in family.laws)]),
-        "pair_sets": [[sets.add(law.static), sets.add(law.dynamic)] for law in family.laws],
-        "pair_causes": [bodies.causes.index(law.cause) for law in family.laws],
-        "pair_restitution": family.restitution,
-        "reach": family.reach,
+        "law_start": np.concatenate(starts) if starts else (),
+        "law_rows": [law.rows for law in laws],
+        "pair_sets": [[sets.add(law.static), sets.add(law.dynamic)] for law in laws],
+        "pair_causes": [bodies.causes.index(law.cause) for law in laws],
+        "pair_restitution": [one.restitution for one in families],
+        "pair_reach": [one.reach for one in families],
+        "reach": max((one.reach for one in families), default=0.0),
     }
 
 

@@ -15,8 +15,9 @@ from polycorner.motion.engine.arrays import CONTACTS, OWN_GAP
 from polycorner.motion.engine.bounds import is_slow
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
+from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, compiled
-from polycorner.motion.engine.neighbours import pair_of, speed_of, travel
+from polycorner.motion.engine.neighbours import bodies_of, speed_of, travel
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import (
     FULL,
@@ -78,7 +79,7 @@ def leave_out(model, state, work, blocks, h):
         if j >= 0 and left[island_of(body, island, block, b)]:
             join(joined, i, j)
     for s in range(state.counts[CONTACTS]):  # piles of sleepers
-        i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
+        i, j = bodies_of(model, state, s)
         if state.pair_flags[s, 1] and not body.awake[i] and not body.awake[j]:
             join(joined, i, j)
     for i in range(N):
@@ -116,10 +117,10 @@ def strikes_early(model, state, manner, mid, pair, block, b):
     """Return whether an open contact is pressed, and not slowly, where the bodies are not."""
     g = block.origin[b, 2]
     if block.origin[b, 0] == OWN_GAP:
-        i = block.origin[b, 1]
-        gap, closed, bounce = mid.gap[i, g], state.touches[i, g] != 0, model.restitution[g]
+        gap, closed, bounce = mid.gap[g], state.touches[g] != 0, model.restitution[g]
     else:
-        index, bounce = pair.before[block.origin[b, 1]], model.pair_restitution
+        index = pair.before[block.origin[b, 1]]
+        bounce = model.pair_restitution[family_of(model, block.bodies[b, 0], block.bodies[b, 1])]
         gap = pair.gap[block.origin[b, 1]]
         closed = index >= 0 and state.pair_flags[index, 1] != 0
     if closed or abs(gap) <= model.zero_gap:
@@ -132,7 +133,7 @@ def rate_of(model, gradient, v, i, g):
     """Return the rate of a gap of a body at a velocity."""
     rate = 0.0
     for c in range(model.dimension):
-        rate += gradient[i, g, c] * v[i, c]
+        rate += gradient[g, c] * v[i, c]
     return rate
 
 
@@ -160,20 +161,21 @@ def body_misses(model, state, work, i, h):
     evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
     if not state.watched[i]:
         evaluate_gaps(model, scratch, i, state.q, path.gap, path.gradient)
-    for g in range(model.restitution.size):
-        f, following = mid.gap[i, g], ahead.gap[i, g]
-        if state.touches[i, g]:
-            if following < min(-deep, f - missed) or (g >= model.unilateral and following > deep):
+    for g in range(model.first_gap[i], model.first_gap[i + 1]):
+        f, following = mid.gap[g], ahead.gap[g]
+        if state.touches[g]:
+            opens = g >= model.first_equation[i] and following > deep
+            if following < min(-deep, f - missed) or opens:
                 return True
             continue
         rate = rate_of(model, mid.gradient, velocity.new, i, g)
         after = rate_of(model, ahead.gradient, velocity.new, i, g)
         if f > -model.zero_gap and may_vanish(open_gap(model, f), rate, following, after, h, deep):
             return True
-        if not state.watched[i] and path.gap[i, g] > 0.0:
+        if not state.watched[i] and path.gap[g] > 0.0:
             before = rate_of(model, path.gradient, state.v, i, g)
             rate = rate_of(model, mid.gradient, state.v, i, g)
-            if may_vanish(path.gap[i, g], before, f, rate, 0.5 * h, model.zero_gap):
+            if may_vanish(path.gap[g], before, f, rate, 0.5 * h, model.zero_gap):
                 return True
     return False
 
@@ -188,7 +190,7 @@ def pair_misses(model, state, mid, velocity, path, scratch, i, j, h):
     if not watched:
         gaps_at(model, path, scratch, state.q, state.v, i, j, 0.0, START)
         gaps_at(model, path, scratch, state.q, state.v, i, j, 0.5 * h, MIDDLE)
-    for g in range(model.pair_gaps):
+    for g in range(model.pair_gaps[family_of(model, i, j)]):
         f0, rate0, f1, rate1 = gap[NEXT, g], rate[NEXT, g], gap[FULL, g], rate[FULL, g]
         misses = f0 > -zero and may_vanish(open_gap(model, f0), rate0, f1, rate1, h, deep)
         if not watched and not misses:
@@ -206,14 +208,14 @@ def mark_misses(model, state, work, left, h):
     """Mark the islands with bodies that cross the boundary of a gap on their way."""
     mid, velocity, body, path, island = work.mid, work.velocity, work.body, work.path, work.island
     neighbours, scratch = work.neighbours, work.scratch
-    if model.restitution.size > 0:
+    if model.first_gap[model.bodies] > 0:
         for i in range(model.bodies):
             if not (state.alive[i] and body.awake[i]) or is_large(island, island.parent[i]):
                 continue
             if body_misses(model, state, work, i, h):
                 left[island.parent[i]] |= 1
     slow = model.near_many * model.gap_unit
-    if model.pair_kernel == 0 or 2.0 * travel(model, body, h) <= slow:
+    if model.families == 0 or 2.0 * travel(model, body, h) <= slow:
         return
     for s in range(neighbours.status[0]):
         i, j = neighbours.pairs[s, 0], neighbours.pairs[s, 1]

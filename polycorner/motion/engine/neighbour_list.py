@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import nearest, position_of, travel
 
@@ -21,7 +22,7 @@ def outdated(model, state, body, neighbours, h, time):
     for i in range(model.bodies):
         if state.alive[i]:
             far = 0.0
-            for a in range(2):
+            for a in range(3):
                 x = position_of(model, state, i, a, time) - neighbours.position[i, a]
                 far += nearest(model, a, x) ** 2
             if far > limit:
@@ -47,7 +48,7 @@ def list_neighbours(model, state, body, island, neighbours, pair, h, time):
     # Twice the present travel, so that a body that gets faster does not make every step list anew.
     neighbours.travel[0] = max(0.125 * SKIN * model.reach, 2.0 * travel(model, body, h))
     for i in range(N):
-        for a in range(2):
+        for a in range(3):
             neighbours.position[i, a] = nearest(model, a, position_of(model, state, i, a, time))
     far = model.reach * (1.0 + SKIN) + max(
         0.0, 2.0 * neighbours.travel[0] - 0.25 * SKIN * model.reach
@@ -188,8 +189,12 @@ def search_column(model, state, neighbours, begin, end, far, count):
 @compiled
 def add_if_near(model, state, neighbours, i, j, along, far, count):
     """Add the ranks of two neighbours, if they are; return how many pairs there are, or -1."""
-    across = nearest(model, 0, neighbours.position[j, 0] - neighbours.position[i, 0])
-    near = across * across + along * along < far * far
+    position, family = neighbours.position, family_of(model, i, j)
+    across = nearest(model, 0, position[j, 0] - position[i, 0])
+    above = nearest(model, 2, position[j, 2] - position[i, 2])
+    # The list is made for the largest reach: that of other bodies is shorter by as much.
+    far -= model.reach - model.pair_reach[family] if family >= 0 else np.inf
+    near = far > 0.0 and across * across + along * along + above * above < far * far
     if count < 0 or not (near and state.alive[i] and state.alive[j]):
         return count
     if count == model.neighbour_room:

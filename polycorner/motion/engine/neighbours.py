@@ -5,6 +5,7 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
+from polycorner.motion.engine.families import family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 
 
@@ -12,12 +13,12 @@ from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 def position_of(model, state, i, a, time):
     """Return one component of a body's position, as a length, relative to the moving substrate.
 
-    The first one is zero where a single coordinate is the position.
+    It is zero where there is none.
     """
-    c = model.position[a]
-    if a == 0 and model.position[1] == c:
+    c = model.position[model.kind[i], a]
+    if c < 0:
         return 0.0
-    x = state.q[i, c] * model.units[c]
+    x = state.q[i, c] * model.units[model.kind[i], c]
     return x - model.substrate_speed * time if a == 0 else x
 
 
@@ -64,6 +65,12 @@ def pair_of(model, state, key):
 
 
 @compiled
+def bodies_of(model, state, s):
+    """Return the bodies of a contact of the last step, the one with the lower number first."""
+    return pair_of(model, state, state.keys[s] // model.most_pair_gaps)
+
+
+@compiled
 def is_near(model, state, mid, body, neighbours, s, limit):
     """Return whether a pair with an awake body may meet, and was not examined in this step yet.
 
@@ -77,16 +84,20 @@ def is_near(model, state, mid, body, neighbours, s, limit):
     neighbours.examined[s], neighbours.least_gap[s] = 1, 0.0
     if not (state.alive[a] and state.alive[b]) or body.waits[a] or body.waits[b]:
         return False
-    return square_distance(model, mid, a, b) < (model.reach + limit) ** 2
+    reach = model.pair_reach[family_of(model, a, b)]
+    return square_distance(model, mid, a, b) < (reach + limit) ** 2
 
 
 @compiled
 def count_gaps(model, mid, neighbours, scratch, slot, limit):
     """Return how many gaps of a pair are small; the least of all is kept."""
     count, least = ZERO, np.inf
-    evaluate_pair(model, scratch, neighbours.pairs[slot, 0], neighbours.pairs[slot, 1], mid.q)
-    for g in range(model.pair_gaps):
-        gap = scratch.values[model.pair_inputs + g]
+    a, b = neighbours.pairs[slot, 0], neighbours.pairs[slot, 1]
+    evaluate_pair(model, scratch, a, b, mid.q)
+    family = family_of(model, a, b)
+    n = pair_inputs(model, family)
+    for g in range(model.pair_gaps[family]):
+        gap = scratch.values[n + g]
         count, least = count + (ONE if gap < limit else ZERO), min(least, gap)
     # Also where it is not small: pairs that stay apart are excluded by it from looking ahead.
     neighbours.least_gap[slot] = least
@@ -140,8 +151,8 @@ def detect_pair(model, state, mid, neighbours, pair, scratch, slot, limit, share
     through the list of the last step; both ascend.
     """
     a, b, least = neighbours.pairs[slot, 0], neighbours.pairs[slot, 1], np.inf
-    K, values = model.lanes, scratch.values
-    n, m = model.pair_inputs, model.pair_gaps
+    K, values, family = model.lanes, scratch.values, family_of(model, a, b)
+    read, n, m = model.first_read[family], pair_inputs(model, family), model.pair_gaps[family]
     evaluate_pair(model, scratch, a, b, mid.q)
     for g in range(m):
         least = min(least, values[n + g])
@@ -153,7 +164,7 @@ def detect_pair(model, state, mid, neighbours, pair, scratch, slot, limit, share
             pair.gap[count] = values[n + g]
             # Pairs ascend, and so do keys: one pass through the list of the last step finds all of
             # them.
-            key = pair_key(model, state, a, b) * m + g
+            key = pair_key(model, state, a, b) * model.most_pair_gaps + g
             cursor = place_among(state, key) if cursor < 0 else advanced(state, cursor, key)
             index = cursor if has_key(state, cursor, key) else NONE
             pair.before[count] = index
@@ -163,7 +174,7 @@ def detect_pair(model, state, mid, neighbours, pair, scratch, slot, limit, share
             for c in range(2 * K):
                 pair.gradient[count, c] = 0.0
             for r in range(n):
-                c = model.pair_reads[r, 0] * K + model.pair_reads[r, 1]
+                c = model.pair_reads[read + r, 0] * K + model.pair_reads[read + r, 1]
                 pair.gradient[count, c] = values[n + m + g * n + r]
             count += 1
     neighbours.least_gap[slot] = least
@@ -173,10 +184,10 @@ def detect_pair(model, state, mid, neighbours, pair, scratch, slot, limit, share
 @compiled
 def speed_of(model, v, i):
     """Return a bound of the speed of a body's points, relative to the moving substrate."""
-    speed = 0.0
+    kind, speed = model.kind[i], 0.0
     for c in range(model.dimension):
-        carried = model.substrate_speed if c == model.position[0] else 0.0
-        speed += abs(v[i, c] * model.units[c] - carried)
+        carried = model.substrate_speed if c == model.substrate_coordinate[kind] else 0.0
+        speed += abs(v[i, c] * model.units[kind, c] - carried)
     return speed
 
 
@@ -199,14 +210,18 @@ def detection_distance(model, body, h):
 
 
 @compiled
+def component(model, of, i, d):
+    """Return a component of a body's position or velocity, as a length; zero if there is none."""
+    c = model.position[model.kind[i], d]
+    return of[i, c] * model.units[model.kind[i], c] if c >= 0 else 0.0
+
+
+@compiled
 def square_distance(model, mid, a, b):
     """Return the squared distance of two bodies' positions at the midpoint."""
     far = 0.0
-    # Where a single coordinate is the position, it stands at both places and counts once.
-    for d in range(0 if model.position[0] != model.position[1] else 1, 2):
-        c = model.position[d]
-        x = (mid.q[a, c] - mid.q[b, c]) * model.units[c]
-        far += nearest(model, d, x) ** 2
+    for d in range(3):
+        far += nearest(model, d, component(model, mid.q, a, d) - component(model, mid.q, b, d)) ** 2
     return far
 
 
@@ -248,7 +263,7 @@ def has_key(state, place, key):
 def key_of(model, state, pair, slot):
     """Return the key of a contact between bodies: a number that sorts by bodies and gap."""
     a, b, g = pair.contact[slot, 0], pair.contact[slot, 1], pair.contact[slot, 2]
-    return pair_key(model, state, a, b) * model.pair_gaps + g
+    return pair_key(model, state, a, b) * model.most_pair_gaps + g
 
 
 @compiled

@@ -15,8 +15,14 @@ import numpy as np
 
 from polycorner.motion.engine.bounds import acts
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
+from polycorner.motion.engine.families import family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.neighbours import find_contact, pair_key, square_distance
+from polycorner.motion.engine.neighbours import (
+    component,
+    find_contact,
+    pair_key,
+    square_distance,
+)
 
 MOST_SEARCH = 80  # evaluations in the search for one contact
 NEVER = np.inf
@@ -38,20 +44,23 @@ def gaps_at(model, path, scratch, base, velocity, i, j, t, row):
     if j < 0:
         # Into arrays beside those of the midpoint, which the solution of the step still needs.
         evaluate_gaps(model, scratch, i, path.q, path.gap, path.gradient)
-        for g in range(model.restitution.size):
-            gap[g], rate[g] = path.gap[i, g], 0.0
+        first = model.first_gap[i]
+        for g in range(model.first_gap[i + 1] - first):
+            gap[g], rate[g] = path.gap[first + g], 0.0
             for c in range(k):
-                rate[g] += path.gradient[i, g, c] * velocity[i, c]
+                rate[g] += path.gradient[first + g, c] * velocity[i, c]
         return
     for c in range(k):
         path.q[j, c] = base[j, c] + t * velocity[j, c]
     evaluate_pair(model, scratch, i, j, path.q)
-    n, m = model.pair_inputs, model.pair_gaps
+    family = family_of(model, i, j)
+    first, n, m = model.first_read[family], pair_inputs(model, family), model.pair_gaps[family]
     for g in range(m):
         gap[g], rate[g] = scratch.values[n + g], 0.0
         for r in range(n):
-            body = i if model.pair_reads[r, 0] == 0 else j
-            rate[g] += scratch.values[n + m + g * n + r] * velocity[body, model.pair_reads[r, 1]]
+            body = i if model.pair_reads[first + r, 0] == 0 else j
+            c = model.pair_reads[first + r, 1]
+            rate[g] += scratch.values[n + m + g * n + r] * velocity[body, c]
 
 
 @compiled
@@ -122,7 +131,7 @@ def first_zero(model, path, scratch, base, velocity, i, j, g, duration, slack, o
 @compiled
 def touching(model, state, i, j, g):
     """Return whether two bodies touched at the end of the last step."""
-    index = find_contact(state, pair_key(model, state, i, j) * model.pair_gaps + g)
+    index = find_contact(state, pair_key(model, state, i, j) * model.most_pair_gaps + g)
     return index >= 0 and state.pair_flags[index, 1] != 0
 
 
@@ -162,12 +171,12 @@ def look_ahead(model, state, mid, velocity, path, scratch, i, j, h):
 @compiled
 def stay_apart(model, state, mid, velocity, i, j, h):
     """Return whether two bodies are too far apart to meet on the way to the next midpoint."""
-    far = model.reach
-    for d in range(0 if model.position[0] != model.position[1] else 1, 2):
-        c = model.position[d]
+    far, new = model.pair_reach[family_of(model, i, j)], velocity.new
+    for d in range(3):
         # Half: with the velocity before they went half a step only.
-        before = 0.5 * abs(state.v[i, c] - state.v[j, c])
-        far += h * max(before, abs(velocity.new[i, c] - velocity.new[j, c])) * model.units[c]
+        before = 0.5 * abs(component(model, state.v, i, d) - component(model, state.v, j, d))
+        after = abs(component(model, new, i, d) - component(model, new, j, d))
+        far += h * max(before, after)
     return square_distance(model, mid, i, j) > far * far
 
 
@@ -177,9 +186,9 @@ def acceptable_length(model, state, work, h, out):
     body, neighbours = work.body, work.neighbours
     length = h
     for i in range(model.bodies):
-        if state.alive[i] and body.awake[i] and model.restitution.size > 0:
+        if state.alive[i] and body.awake[i] and model.first_gap[model.bodies] > 0:
             length = min(length, acceptable_to(model, state, work, i, NONE, h, out))
-    for s in range(neighbours.status[0] if model.pair_kernel != 0 else ZERO):
+    for s in range(neighbours.status[0] if model.families > 0 else ZERO):
         i, j = neighbours.pairs[s, 0], neighbours.pairs[s, 1]
         if not (body.awake[i] and body.awake[j] and state.alive[i] and state.alive[j]):
             continue
@@ -196,11 +205,12 @@ def acceptable_to(model, state, work, i, j, h, out):
     deep, length, sunk = 2.0 * model.bending * model.gap_unit, h, False
     missed = h * model.tolerance * work.body.island_speed[i]  # shorter parts miss no less
     look_ahead(model, state, mid, velocity, path, scratch, i, j, h)
-    for g in range(model.restitution.size if j < 0 else model.pair_gaps):
+    first, family = model.first_gap[i], NONE if j < 0 else family_of(model, i, j)
+    for g in range(model.first_gap[i + 1] - first if j < 0 else model.pair_gaps[family]):
         if j < 0:
-            closed, bounce = state.touches[i, g] != 0, model.restitution[g]
+            closed, bounce = state.touches[first + g] != 0, model.restitution[first + g]
         else:
-            closed, bounce = touching(model, state, i, j, g), model.pair_restitution
+            closed, bounce = touching(model, state, i, j, g), model.pair_restitution[family]
         acting = acts(
             model, manner, scratch.way_gap[NEXT, g], scratch.way_rate[MIDDLE, g], bounce, closed
         )
@@ -212,7 +222,8 @@ def acceptable_to(model, state, work, i, j, h, out):
         if acting:
             following = scratch.way_gap[FULL, g]
             sunk = sunk or following < min(-deep, scratch.way_gap[NEXT, g] - missed)
-            sunk = sunk or (j < 0 and g >= model.unilateral and following > deep)
+            bilateral = j < 0 and first + g >= model.first_equation[i]
+            sunk = sunk or (bilateral and following > deep)
     # A contact sinks by the square of the length: halves are a quarter as bad.
     if sunk and h > model.shortest_part * model.step:
         length = min(length, 0.5 * h)

@@ -77,8 +77,7 @@ def do_range(model, state, work, kind, begin, end):
                     told[codes.STEP_INDEX],
                 )
     elif kind == codes.ASSEMBLE:
-        b = told[codes.SET_OFF] + (1 + model.pair_laws) * begin
-        assemble_contacts(model, state, work, h, begin, end, b)
+        assemble_contacts(model, state, work, h, begin, end, pair.first_block[begin])
     elif kind == codes.START:
         for i in range(begin, end):
             start_body(model, state, work, i)

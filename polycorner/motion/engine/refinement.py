@@ -181,13 +181,14 @@ def count_residuals(model, state, work, log, time, count):
 @compiled
 def set_time(model, time):
     """Tell the formulas the time, and what depends on nothing else."""
-    at = model.time_parameter
-    if at >= 0:
-        model.parameters[at] = model.start + time
-        if model.signal_kernel != 0:
-            base = model.parameters.ctypes.data
-            known = base + 8 * model.signal_parameters
-            call_kernel(model.signal_kernel, base + 8 * at, known, base + 8 * (at + 1), base, base)
+    base = model.parameters.ctypes.data
+    for kind in range(model.kind[model.bodies - 1] + 1):
+        at, signals = model.time_parameter[kind], model.signal_kernel[kind]
+        if at >= 0:
+            model.parameters[at] = model.start + time
+            if signals != 0:
+                known = base + 8 * model.signal_parameters[kind]
+                call_kernel(signals, base + 8 * at, known, base + 8 * (at + 1), base, base)
 
 
 @compiled

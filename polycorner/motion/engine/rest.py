@@ -14,14 +14,14 @@ def load_of(model, mid, lam, i, f):
     """Return the normal impulse that presses on a friction contact of a body."""
     pressing = model.pressing_gap[f]
     if pressing < 0:
-        return mid.load[i, f]
-    return abs(lam[i, pressing]) if pressing >= model.unilateral else lam[i, pressing]
+        return mid.load[f]
+    return abs(lam[pressing]) if pressing >= model.first_equation[i] else lam[pressing]
 
 
 @compiled
 def holds(model, lam, i, g):
     """Return whether a gap of a body remains zero at rest: it is pressed, or an equation."""
-    return g >= model.unilateral or lam[i, g] > 0.0
+    return g >= model.first_equation[i] or lam[g] > 0.0
 
 
 @compiled
@@ -34,43 +34,44 @@ def compliance(model, mid, lam, i, g):
     k, square, weight = model.dimension, 0.0, 0.0
     # The square of the load makes small loads yield little: contacts that hardly press stay
     # pressed.
-    if g < model.unilateral:
-        return lam[i, g] ** 2
+    if g < model.first_equation[i]:
+        return lam[g] ** 2
     for c in range(k):
         for a in range(k):
             entry = mid.inverse_mass[i, c, a]
-            weight += mid.gradient[i, g, c] * entry * mid.gradient[i, g, a]
+            weight += mid.gradient[g, c] * entry * mid.gradient[g, a]
             square += mid.force[i, c] * entry * mid.force[i, a]
-    return max(lam[i, g] ** 2, square / weight if weight > 0.0 else 0.0)
+    return max(lam[g] ** 2, square / weight if weight > 0.0 else 0.0)
 
 
 @compiled
 def find_rest_velocity(model, mid, scratch, lam, i, out):
     """Find the velocity at which no loaded contact slips or opens; return whether there is one."""
-    k, F = model.dimension, model.frictions
-    A = scratch.matrix
+    k, A = model.coordinates[model.kind[i]], scratch.matrix
     for c in range(k):
         out[c] = 0.0
         for a in range(k):
             A[c, a] = 0.0
-    for g in range(model.restitution.size):
+    for g in range(model.first_gap[i], model.first_gap[i + 1]):
         if holds(model, lam, i, g):
-            add_square(A, mid.gradient[i, g], 1.0, k)
-    for f in range(F):
+            add_square(A, mid.gradient[g], 1.0, k)
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
         if load_of(model, mid, lam, i, f) > 0.0:
             for r in range(model.slip_start[f], model.slip_start[f + 1]):
-                add_square(A, mid.slip_rows[i, r], 1.0, k)
+                add_square(A, mid.slip_rows[r], 1.0, k)
                 for c in range(k):
-                    out[c] -= mid.slip_offset[i, r] * mid.slip_rows[i, r, c]
+                    out[c] -= mid.slip_offset[r] * mid.slip_rows[r, c]
     if not solve_spd(A, out, k):
         return False
-    top = 0.0
+    top, units = 0.0, model.units[model.kind[i]]
     for c in range(k):
-        top = max(top, abs(out[c]) * model.units[c])
+        top = max(top, abs(out[c]) * units[c])
     for c in range(k):
         # Exact zeros, so that the velocity of rest is the same number in each step.
-        if abs(out[c]) * model.units[c] <= 1e-13 * top:
+        if abs(out[c]) * units[c] <= 1e-13 * top:
             out[c] = 0.0
+    for c in range(k, model.dimension):
+        out[c] = 0.0
     return keeps_contacts(model, mid, lam, i, out)
 
 
@@ -78,22 +79,22 @@ def find_rest_velocity(model, mid, scratch, lam, i, out):
 def keeps_contacts(model, mid, lam, i, v):
     """Return whether no loaded contact of a body slips or opens at a velocity."""
     k = model.dimension
-    for g in range(model.restitution.size):
+    for g in range(model.first_gap[i], model.first_gap[i + 1]):
         if holds(model, lam, i, g):
             value, size = 0.0, 0.0
             for c in range(k):
-                value += mid.gradient[i, g, c] * v[c]
-                size += abs(mid.gradient[i, g, c] * v[c])
+                value += mid.gradient[g, c] * v[c]
+                size += abs(mid.gradient[g, c] * v[c])
             if abs(value) > 1e-11 * size:
                 return False
-    for f in range(model.frictions):
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
         if load_of(model, mid, lam, i, f) > 0.0:
             for r in range(model.slip_start[f], model.slip_start[f + 1]):
-                value = mid.slip_offset[i, r]
+                value = mid.slip_offset[r]
                 size = abs(value)
                 for c in range(k):
-                    value += mid.slip_rows[i, r, c] * v[c]
-                    size += abs(mid.slip_rows[i, r, c] * v[c])
+                    value += mid.slip_rows[r, c] * v[c]
+                    size += abs(mid.slip_rows[r, c] * v[c])
                 if abs(value) > 1e-11 * size:
                     return False
     return True
@@ -122,55 +123,56 @@ def balances(model, state, mid, sleep, scratch, i, others, again, slack):
     sets, up to a relative slack, it proves that the body remains at rest.  It is left in
     ``sleep.proof_friction`` and ``sleep.proof_normal``.
     """
-    k, F, m = model.dimension, model.frictions, model.restitution.size
-    A, r = scratch.matrix, scratch.vector
+    k, A, r = model.coordinates[model.kind[i]], scratch.matrix, scratch.vector
+    first_gap, last_gap = model.first_gap[i], model.first_gap[i + 1]
+    first, last = model.first_friction[i], model.first_friction[i + 1]
     lam, friction = sleep.proof_normal, sleep.proof_friction
     for c in range(k):
         r[c] = -(mid.force[i, c] + mid.kick[i, c]) - others[i, c]
         for a in range(k):
             A[c, a] = 0.0
-    for g in range(m):
-        lam[i, g] = state.normal[i, g]
+    for g in range(first_gap, last_gap):
+        lam[g] = state.normal[g]
         if holds(model, lam, i, g):
-            add_square(A, mid.gradient[i, g], compliance(model, mid, lam, i, g), k)
+            add_square(A, mid.gradient[g], compliance(model, mid, lam, i, g), k)
             for c in range(k):
-                r[c] -= lam[i, g] * mid.gradient[i, g, c]
-    for f in range(F):
+                r[c] -= lam[g] * mid.gradient[g, c]
+    for f in range(first, last):
         load = load_of(model, mid, state.normal, i, f)
         # From zero the least change is the impulse farthest from slipping; from that of the last
         # step it follows loads that change slowly.
         central = model.pressing_gap[f] < 0 and not again
         for a in range(2):
-            friction[i, f, a] = 0.0 if central else state.friction[i, f, a]
+            friction[f, a] = 0.0 if central else state.friction[f, a]
         if load > 0.0:
             for row in range(model.slip_start[f], model.slip_start[f + 1]):
-                add_square(A, mid.slip_rows[i, row], load * load, k)
+                add_square(A, mid.slip_rows[row], load * load, k)
                 for c in range(k):
-                    r[c] -= friction[i, f, row - model.slip_start[f]] * mid.slip_rows[i, row, c]
+                    r[c] -= friction[f, row - model.slip_start[f]] * mid.slip_rows[row, c]
     # Where the contacts do not hold the body in all directions the matrix is singular, and its rest
     # is not proved by them.
     if not keeps_contacts(model, mid, state.normal, i, state.v[i]) or not solve_spd(A, r, k):
         return False
-    for g in range(m):
+    for g in range(first_gap, last_gap):
         if holds(model, lam, i, g):
             change = 0.0
             for c in range(k):
-                change += mid.gradient[i, g, c] * r[c]
-            lam[i, g] += compliance(model, mid, state.normal, i, g) * change
-            if lam[i, g] < 0.0 and g < model.unilateral:
+                change += mid.gradient[g, c] * r[c]
+            lam[g] += compliance(model, mid, state.normal, i, g) * change
+            if lam[g] < 0.0 and g < model.first_equation[i]:
                 return False
-    for f in range(F):
+    for f in range(first, last):
         before = load_of(model, mid, state.normal, i, f)
         if before <= 0.0:
             continue
         for row in range(model.slip_start[f], model.slip_start[f + 1]):
             change = 0.0
             for c in range(k):
-                change += mid.slip_rows[i, row, c] * r[c]
-            friction[i, f, row - model.slip_start[f]] += before * before * change
+                change += mid.slip_rows[row, c] * r[c]
+            friction[f, row - model.slip_start[f]] += before * before * change
         load = load_of(model, mid, lam, i, f)
         if not contains(
-            model, model.friction_sets[f, 0], friction[i, f, 0], friction[i, f, 1], load, slack
+            model, model.friction_sets[f, 0], friction[f, 0], friction[f, 1], load, slack
         ):
             return False
     return True
@@ -185,14 +187,14 @@ def comes_to_rest(model, state, work, i, rest):
     """
     mid, velocity, sleep, scratch = work.mid, work.velocity, work.sleep, work.scratch
     k = model.dimension
-    for f in range(model.frictions):
-        if load_of(model, mid, state.normal, i, f) > 0.0 and not state.sticks[i, f]:
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
+        if load_of(model, mid, state.normal, i, f) > 0.0 and not state.sticks[f]:
             return False
     if not find_rest_velocity(model, mid, scratch, state.normal, i, rest):
         return False
     size, far, old = work.body.island_speed[i], 0.0, 0.0
     for c in range(k):
-        unit = model.units[c]
+        unit = model.units[model.kind[i], c]
         size = max(size, abs(rest[c]) * unit)
         far = max(far, abs(velocity.new[i, c] - rest[c]) * unit)
         old = max(old, abs(state.v[i, c] - rest[c]) * unit)

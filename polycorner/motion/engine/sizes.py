@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from polycorner.motion.bodies import IdenticalBodies
+from polycorner.motion.bodies import MovingBodies
 
 WIDTH = 4  # reals in a vector
 MOST_ENTRIES = 48  # of a body above the diagonal of the matrix, on average, at most
@@ -15,15 +15,18 @@ class Sizes(NamedTuple):
     """Sizes on which the shapes depend."""
 
     N: int  # bodies
-    k: int  # coordinates of a body
+    A: int  # kinds of bodies
+    k: int  # coordinates of a body, of the kind that has most of them
     K: int  # the same, rounded up to whole vectors
-    F: int  # friction contacts of a body with its surroundings
+    F: int  # friction contacts of all bodies with their surroundings
     R: int  # rows of their slip velocities
     L: int  # known loads of a body, at least 1
-    m: int  # gaps between a body and its surroundings
-    G: int  # gaps between two bodies
-    H: int  # laws of friction at each of these
-    T: int  # rows of their slip velocities
+    U: int  # gaps between bodies and their surroundings, of all bodies
+    m: int  # those of a body, at most
+    J: int  # families of contacts between two bodies
+    G: int  # gaps between two bodies, at most
+    H: int  # laws of friction of all families
+    T: int  # rows of the slip velocities of a family, at most
     Y: int  # gaps of a body or of two, whichever are more
     D: int  # causes of dissipation
     C: int  # contacts between bodies for which there is room
@@ -38,39 +41,45 @@ class Sizes(NamedTuple):
     V: int  # items of a phase
 
     @classmethod
-    def of(cls, bodies: IdenticalBodies, contacts: int) -> "Sizes":
+    def of(cls, bodies: MovingBodies, contacts: int) -> "Sizes":
         """Return the sizes of bodies with room for so many contacts between them."""
-        body, N, k = bodies.body, bodies.count, bodies.dimension
-        F, m, R = len(body.friction), len(body.contacts), sum(c.rows for c in body.friction)
-        families = [body.formulation.forces]
-        laws = () if bodies.contacts is None else bodies.contacts.laws
-        if bodies.contacts is not None:
-            families += [bodies.contacts.gaps, *(slip for slip, _, _ in bodies.contacts.slips)]
-        shapes = [(len(f.names), len(f.variables)) for f in families]
-        calls = [*body.gaps, *body.formulation.slip_calls]
+        kinds, families = bodies.kinds, [*bodies.families.values()]
+        N, k, F = bodies.total, bodies.width, bodies.frictions
+        own = sum(kind.count * len(kind.body.contacts) for kind in kinds)
+        called = [kind.body.formulation.forces for kind in kinds]
+        for family in families:
+            called += [family.gaps, *(slip for slip, _, _ in family.slips)]
+        shapes = [(len(f.names), len(f.variables)) for f in called]
+        calls = [c for a in kinds for c in (*a.body.gaps, *a.body.formulation.slip_calls)]
         shapes += [(len(call.family.names), len(call.reads)) for call in calls]
         kernels = [m * (1 + k) + k for m, k in shapes]
         lanes = -(-k // WIDTH) * WIDTH
         pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
         entries = N * min(N - 1, MOST_ENTRIES)
-        blocks = N * (F + m) + (1 + len(laws)) * contacts
+        laws = max((len(family.laws) for family in families), default=0)
+        blocks = F + own + (1 + laws) * contacts
+        gaps = max((len(family.gaps.names) for family in families), default=0)
+        most = max(len(kind.body.contacts) for kind in kinds)
         return cls(
             N=N,
+            A=len(kinds),
             k=k,
             K=lanes,
             F=F,
-            R=R,
-            L=max(1, body.formulation.loads),
-            m=m,
-            G=len(bodies.pair_contacts),
-            H=len(laws),
-            T=sum(law.rows for law in laws),
-            Y=max(m, len(bodies.pair_contacts)),
+            R=sum(a.count * sum(c.rows for c in a.body.friction) for a in kinds),
+            L=max(1, *(kind.body.formulation.loads for kind in kinds)),
+            U=own,
+            m=most,
+            J=len(families),
+            G=gaps,
+            H=sum(len(family.laws) for family in families),
+            T=max((sum(law.rows for law in family.laws) for family in families), default=0),
+            Y=max(most, gaps),
             D=len(bodies.causes),
             C=contacts,
             P=pairs,
             B=blocks,
-            E=EVENTS + 2 * contacts + N * (3 + m),
+            E=EVENTS + 2 * contacts + 3 * N + own,
             S=max(contacts, pairs, 1),
             W=max(kernels) + 16,
             Q=entries,

@@ -11,7 +11,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.jit import compiled
-from polycorner.motion.engine.neighbours import pair_of
+from polycorner.motion.engine.neighbours import bodies_of
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rest import (
@@ -50,7 +50,7 @@ def wake(model, state, work, h, time, index):
             body.evaluated[i], body.awake[i], any_awake = 1, 1, True
         elif not stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index):
             body.awake[i], any_awake = 1, True
-    if any_awake and model.pair_kernel != 0:
+    if any_awake and model.families > 0:
         wake_piles(model, state, work, h, time, index)
     return any_awake
 
@@ -69,7 +69,7 @@ def wake_piles(model, state, work, h, time, index):
         return
     for s in range(state.counts[CONTACTS]):
         if state.pair_flags[s, 1]:
-            i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
+            i, j = bodies_of(model, state, s)
             x, y = root_of(root, i), root_of(root, j)
             root[max(x, y)] = min(x, y)
     for i in range(N):
@@ -101,13 +101,13 @@ def stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index):
         # A body that wakes has no impulses of rest in this step: those of the last check count for
         # all steps since.
         share = 0.5 * steps if asleep else 0.0
-        for f in range(model.frictions):
+        for f in range(model.first_friction[i], model.first_friction[i + 1]):
             for r in range(model.slip_start[f + 1] - model.slip_start[f]):
-                before, now = state.booked_friction[i, f, r], sleep.proof_friction[i, f, r]
+                before, now = state.booked_friction[f, r], sleep.proof_friction[f, r]
                 p = (steps - share) * before + share * now
-                state.sums[SUBSTRATE_WORK] -= p * mid.slip_offset[i, model.slip_start[f] + r]
+                state.sums[SUBSTRATE_WORK] -= p * mid.slip_offset[model.slip_start[f] + r]
                 if asleep:
-                    state.booked_friction[i, f, r] = now
+                    state.booked_friction[f, r] = now
         for c in range(model.dimension):
             before, now = state.booked_applied[i, c], mid.applied[i, c]
             mean = (steps - share) * before + share * now
@@ -122,14 +122,14 @@ def stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index):
 def next_check(model, state, mid, sleep, i, h, index):
     """Return the step in which a sleeper is checked again."""
     rate = 0.0
-    for f in range(model.frictions):
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
         load = load_of(model, mid, sleep.proof_normal, i, f)
         if load <= 0.0:
             continue
-        x, y = sleep.proof_friction[i, f, 0], sleep.proof_friction[i, f, 1]
+        x, y = sleep.proof_friction[f, 0], sleep.proof_friction[f, 1]
         if not contains(model, model.friction_sets[f, 0], x, y, load * (1.0 - SLEEP_MARGIN), 0.0):
             return index + 1
-        change = abs(x - state.friction[i, f, 0]) + abs(y - state.friction[i, f, 1])
+        change = abs(x - state.friction[f, 0]) + abs(y - state.friction[f, 1])
         rate = max(rate, change / load)
     if model.follows_time:
         return index + 1
@@ -139,9 +139,9 @@ def next_check(model, state, mid, sleep, i, h, index):
         steps = np.int64(0.1 * SLEEP_MARGIN / rate)
     for c in range(model.dimension):
         # Forces that are drawn anew in each step have no rate.
-        if model.kicks[c] > 0.0:
+        if model.kicks[model.kind[i], c] > 0.0:
             return index + 1
-    for g in range(model.restitution.size):
+    for g in range(model.first_gap[i], model.first_gap[i + 1]):
         # Impulses of contacts depend on each other; only known loads change slowly by themselves.
         if holds(model, sleep.proof_normal, i, g):
             return index + 1
@@ -168,7 +168,7 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
         for c in range(k):
             sleep.neighbour_impulse[i, c] = 0.0
     for s in range(state.counts[CONTACTS]):
-        i, j = pair_of(model, state, state.keys[s] // model.pair_gaps)
+        i, j = bodies_of(model, state, s)
         if body.awake[i] or body.awake[j]:
             sleep.disturbed[i] = sleep.disturbed[j] = 1
             continue
@@ -227,14 +227,14 @@ def settle(model, state, work, h, index):
             if not body.awake[i]:
                 state.booked_to[i] = index + 1
                 state.check_due[i] = next_check(model, state, mid, sleep, i, h, index)
-            for f in range(model.frictions):
+            for f in range(model.first_friction[i], model.first_friction[i + 1]):
                 for r in range(2):
-                    state.friction[i, f, r] = sleep.proof_friction[i, f, r]
-                    state.booked_friction[i, f, r] = sleep.proof_friction[i, f, r]
+                    state.friction[f, r] = sleep.proof_friction[f, r]
+                    state.booked_friction[f, r] = sleep.proof_friction[f, r]
             for c in range(k):
                 state.booked_applied[i, c] = mid.applied[i, c]
-            for g in range(model.restitution.size):
-                before, now = state.normal[i, g], sleep.proof_normal[i, g]
-                release = release_time(before, now, state.release[i, g], h, index * h)
-                state.normal[i, g], state.pressed[i, g] = now, now
-                state.release[i, g] = release
+            for g in range(model.first_gap[i], model.first_gap[i + 1]):
+                before, now = state.normal[g], sleep.proof_normal[g]
+                release = release_time(before, now, state.release[g], h, index * h)
+                state.normal[g], state.pressed[g] = now, now
+                state.release[g] = release

@@ -6,6 +6,7 @@ from polycorner.motion.engine.arrays import CONTACTS, ISLANDS, SETTLED, STRIPS, 
 from polycorner.motion.engine.blocks import (
     assemble_body_blocks,
     assemble_contacts,
+    place_blocks,
     respond_to_rows,
 )
 from polycorner.motion.engine.contact_list import (
@@ -82,8 +83,7 @@ def assemble_blocks(model, state, work, h, contacts, ascending):
         blocks = assemble_contacts(model, state, work, h, ZERO, contacts, first)
     else:
         # Every contact has all its blocks, so that threads know where theirs begin.
-        blocks = first + (1 + model.pair_laws) * contacts
-        shared.told[codes.SET_OFF] = first
+        blocks = place_blocks(model, work.pair, contacts, first)
         share_range(model, state, work, codes.ASSEMBLE, contacts, h)
     find_islands(model, body, work.island, work.block, blocks)
     start_blocks(model, work, blocks)
@@ -116,7 +116,7 @@ def solve_islands(model, state, work, blocks, h, again):
     """
     island, shared = work.island, work.shared
     starts = island.start
-    most = 2 if model.unilateral == model.restitution.size else MOST_CORRECTIONS
+    most = 2 if model.equations == 0 else MOST_CORRECTIONS
     if model.follows_velocity:
         most = 1
     for attempt in range(most):

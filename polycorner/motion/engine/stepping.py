@@ -37,7 +37,7 @@ from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbour_list import list_neighbours, outdated
-from polycorner.motion.engine.neighbours import pair_of
+from polycorner.motion.engine.neighbours import bodies_of
 from polycorner.motion.engine.sleep import settle, wake_neighbours
 from polycorner.motion.engine.solution import (
     assemble_blocks,
@@ -62,7 +62,7 @@ def solve(model, state, work, h, time, index, solved):
     manner, mid, body = work.manner, work.mid, work.body
     island, neighbours, pair = work.island, work.neighbours, work.pair
     contacts, blocks = neighbours.status[2] if solved else ZERO, solved
-    if model.pair_kernel != 0 and not solved:
+    if model.families > 0 and not solved:
         renew_ranks(model, state, manner, mid, neighbours, pair, index)
         if outdated(model, state, body, neighbours, h, time) and not list_neighbours(
             model, state, body, island, neighbours, pair, h, time
@@ -75,14 +75,14 @@ def solve(model, state, work, h, time, index, solved):
         if solved:
             renew_blocks(model, state, work, blocks, h)
         else:
-            if model.pair_kernel != 0:
+            if model.families > 0:
                 contacts = detect_contacts(model, state, work, h, contacts)
                 if contacts < 0:
                     return False, blocks
             blocks = assemble_blocks(model, state, work, h, contacts, found == 0)
         solve_islands(model, state, work, blocks, h, solved > 0)
         store_all_impulses(model, state, work, blocks, h)
-        if model.pair_kernel == 0 or not wake_neighbours(
+        if model.families == 0 or not wake_neighbours(
             model, state, work, blocks, h, time + 0.5 * h, index
         ):
             break
@@ -167,7 +167,7 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
     observe(model, state, work, blocks, h, time)
     if any_awake:
         count = record_contacts(work.pair, work.block, work.event, log, blocks, count)
-        if model.pair_kernel != 0:
+        if model.families > 0:
             count = list_contacts(model, state, work, log, h, time, count)
     for i in range(N):
         sleep.rested[i] = state.rests[i]
@@ -185,11 +185,12 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
             state.q[i, c] = work.mid.q[i, c] + 0.5 * h * state.v[i, c]
             if model.crowd_sweeps > 0 and body.awake[i]:
                 state.q[i, c] += work.crowd.shift[i, c]
-        if model.exit_coordinate >= 0 and state.q[i, model.exit_coordinate] > model.exit_limit:
+        leaving, limit = model.exit_coordinate[model.kind[i]], model.exit_limit[model.kind[i]]
+        if leaving >= 0 and state.q[i, leaving] > limit:
             state.alive[i] = 0
             count = record(log, count, EXIT, i, NONE, NONE, time + h, 0.0)
             for s in range(state.counts[CONTACTS]):
-                one, two = pair_of(model, state, state.keys[s] // model.pair_gaps)
+                one, two = bodies_of(model, state, s)
                 if i in (one, two):
                     # What it held up has to be asked at once whether it still rests.
                     state.check_due[one] = state.check_due[two] = 0

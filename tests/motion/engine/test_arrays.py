@@ -34,7 +34,7 @@ def test_shapes_are_sums_and_products_of_sizes():
 
 
 def test_sizes_count_what_bodies_have():
-    assert SIZES[:13] == (3, 4, 4, 3, 5, 2, 2, 9, 1, 2, 9, 4, 16)
+    assert SIZES[:16] == (3, 1, 4, 4, 9, 15, 2, 6, 2, 1, 9, 1, 2, 9, 4, 16)
     assert (SIZES.P, SIZES.B) == (3, 3 * 5 + 2 * 16)
 
 

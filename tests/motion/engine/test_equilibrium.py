@@ -65,7 +65,7 @@ def least_motion(engine, before):
     sums, rules = rest_problem(engine, before, 0.0)
     for i, total in sums.items():
         velocity = work.mid.inverse_mass[i, :, : model.dimension] @ total
-        rules.append(cp.norm_inf(cp.multiply(model.units, velocity)) <= most)
+        rules.append(cp.norm_inf(cp.multiply(model.units[model.kind[i]], velocity)) <= most)
     cp.Problem(cp.Minimize(most), rules).solve(solver=cp.CLARABEL)
     speeds = [
         abs(work.block.free[b, :rows] + work.block.offset[b, :rows]).max()

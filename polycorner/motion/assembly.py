@@ -1,0 +1,240 @@
+"""Assemblies: many bodies of several kinds, each repeated."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polycorner.checks import instance, mapping, names, real, reals, refuse, whole
+from polycorner.kinds import checked
+from polycorner.motion.bodies import IdenticalBodies, PairContacts, SeveralKinds
+from polycorner.motion.contacts import ContactFamily, periods_of, position_of
+from polycorner.motion.formulation import energies
+from polycorner.motion.mechanics import MechanicalSystem, State
+from polycorner.motion.placements import check_contacts, check_equations, check_velocities
+from polycorner.motion.system import System, leapfrog_limit
+from polycorner.spaces.manifold import Array
+from polycorner.values import cached_property
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly(MechanicalSystem):
+    """Many bodies of several kinds with unilateral contacts and friction.
+
+    Bodies are numbered kind after kind, from 0; in messages they are called ``large 1``,
+    ``large 2``, ..., ``small 1``, ...
+
+    Parameters
+    ----------
+    kinds : mapping from str to System
+        One body of each kind, with its contacts with the surroundings.  The substrate, if it moves,
+        moves under all of them.
+    count : mapping from str to int
+        How many of each there are.
+    between : mapping from (str, str) to ContactFamily, optional
+        Contacts of any two bodies of one kind, or of two: the first of the pair has the coordinates
+        with 1.  Bodies of pairs that are left out pass through each other.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+
+    Examples
+    --------
+    Points on a line, of which the heavy ones keep a distance of 2 and the others one of 1:
+
+    >>> from polycorner import Manifold, Polyhedron, System, simulate, velocities
+    >>> from polycorner.motion import Assembly, ContactFamily, pair_coordinates
+    >>> M = Manifold.euclidean("x")
+    >>> (x,), (v,) = M.symbols, velocities(M)
+    >>> (one,), (two,) = pair_coordinates(M)
+    >>> line = Polyhedron(M, {"left": x, "right": 10 - x})
+    >>> def apart(distance):
+    ...     return ContactFamily({"apart": ((two - one) ** 2 - distance**2) / 2}, distance, ["x"])
+    >>> points = Assembly(
+    ...     {"heavy": System(line, 5 * v**2), "light": System(line, v**2 / 2)},
+    ...     {"heavy": 2, "light": 2},
+    ...     {
+    ...         ("heavy", "heavy"): apart(2),
+    ...         ("heavy", "light"): apart(1),
+    ...         ("light", "light"): apart(1),
+    ...     },
+    ... )
+    >>> start = points.state({"heavy": [[0], [3]], "light": [[5], [8]]}, [1, 0, 0, 0])
+    >>> path = simulate(points, start, 2.0, 0.01)
+    >>> path["heavy"].q[-1].round(2).tolist(), path.bodies
+    ([[1.5], [3.5]], ('heavy 1', 'heavy 2', 'light 1', 'light 2'))
+    """
+
+    kinds: Mapping[str, System]
+    count: Mapping[str, int]
+    between: Mapping[Pair, ContactFamily] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        kinds, count = mapping("kinds", self.kinds), mapping("count", self.count)
+        if not kinds:
+            refuse("kinds", "at least one kind of body", kinds)
+        names("count", count, kinds)
+        if missing := [name for name in kinds if name not in count]:
+            refuse("count", f"a number for every kind, {missing[0]!r} included", count)
+        for name, one in kinds.items():
+            whole(f"count of {name!r}", count[name], least=1)
+            if instance("kinds", one, System).count != 1 or one.between is not None:
+                refuse("kinds", f"one body as {name!r}, counts and contacts apart", one.count)
+            if {*one.substrate.values()} != {*next(iter(kinds.values())).substrate.values()}:
+                refuse("kinds", f"the same substrate for {name!r} as for others", one.substrate)
+        object.__setattr__(self, "kinds", dict(kinds))
+        object.__setattr__(self, "count", {name: int(count[name]) for name in kinds})
+        self._order_pairs()
+        _ = self.bodies
+        super().__post_init__()
+
+    def _order_pairs(self) -> None:
+        order, found = list(self.kinds), dict[Pair, ContactFamily]()
+        for pair, family in mapping("between", self.between).items():
+            if not (isinstance(pair, tuple) and len(pair) == 2):
+                refuse("between", "pairs of kinds", pair)
+            names("between", pair, self.kinds)
+            instance("between", family, ContactFamily)
+            if order.index(pair[0]) > order.index(pair[1]):
+                refuse("between", f"pairs in the order of the kinds, {', '.join(order)}", pair)
+            either = {n for name in pair for n in self.kinds[name].manifold.names}
+            names("position", family.position, either)
+            found[pair] = family
+        object.__setattr__(self, "between", found)
+
+    @cached_property
+    def bodies(self) -> SeveralKinds:
+        """The bodies and their contacts, for the engine."""
+        order = list(self.kinds)
+        own = {name: self._kind(name) for name in order}
+        between: dict[tuple[int, int], PairContacts] = {}
+        for (one, two), family in self.between.items():
+            if one != two:
+                spaces = self.kinds[one].manifold, self.kinds[two].manifold
+                between[order.index(one), order.index(two)] = family.compiled(*spaces)
+        lengths = {kind.period for kind in own.values()}
+        if len(lengths) > 1:
+            refuse("kinds", "positions that repeat after the same lengths", sorted(lengths))
+        return SeveralKinds(own, between, *lengths, next(iter(own.values())).substrate_speed)
+
+    def _kind(self, name: str) -> IdenticalBodies:
+        """Return the bodies of one kind, whose position is that of all pairs that it is in."""
+        kind, family = self.kinds[name], self.between.get((name, name))
+        given = [n for pair, f in self.between.items() if name in pair for n in f.position]
+        chosen = [n for n in dict.fromkeys(given) if n in kind.manifold.names]
+        if len(chosen) > 3:
+            refuse("position", f"up to three coordinates of {name!r}", chosen)
+        position = position_of(kind.manifold, chosen, kind.substrate, several=bool(chosen))
+        return replace(
+            kind.bodies,
+            count=self.count[name],
+            contacts=None if family is None else family.compiled(kind.manifold),
+            position=position,
+            period=periods_of(kind.manifold, position),
+        )
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """Names of the equations of unit vectors and quaternions."""
+        return frozenset().union(*(kind.hidden for kind in self.kinds.values()))
+
+    def split(self, values: ArrayLike) -> dict[str, Array]:
+        """Return coordinates or velocities ``(..., D)`` of all bodies by kind, ``(..., n, k)``."""
+        every = reals("values", values)
+        if every.shape[-1:] != self.bodies.shape:
+            refuse("values", f"an array (..., {self.bodies.shape[0]})", every.shape)
+        return dict(zip(self.kinds, self.bodies.split(every), strict=True))
+
+    def _joined(self, argument: str, given: Any) -> Array:
+        """Return coordinates or velocities ``(D,)``, given so or by kind."""
+        if not isinstance(given, Mapping):
+            flat = reals(argument, given)
+            if flat.shape != self.bodies.shape:
+                refuse(argument, f"a mapping by kind, or shape {self.bodies.shape}", flat.shape)
+            return flat.copy()
+        names(argument, given, self.kinds)
+        parts = []
+        for name, n in self.count.items():
+            shape = n, self.kinds[name].manifold.size
+            if name not in given and argument == "q":
+                refuse(argument, f"placements of every kind, {name!r} included", [*given])
+            part = reals(f"{argument} of {name!r}", given.get(name, np.zeros(shape)))
+            if part.shape != shape:
+                refuse(f"{argument} of {name!r}", f"shape {shape}", part.shape)
+            parts.append(part.ravel())
+        return np.concatenate(parts)
+
+    def state(
+        self,
+        q: ArrayLike | Mapping[str, ArrayLike],
+        v: ArrayLike | Mapping[str, ArrayLike] | None = None,
+        time: float = 0.0,
+    ) -> State:
+        """Return a state, after checking that nothing overlaps and that equations hold.
+
+        Parameters
+        ----------
+        q : mapping from str to (n, k) array, or (D,) array
+            Placements by kind, or all coordinates, body after body.
+        v : the same, optional
+            Velocities; default those of the substrate, of kinds that are left out zero.
+        time : float, optional
+        """
+        places = self._joined("q", q)
+        speeds = np.zeros(places.shape) if v is None else self._joined("v", v)
+        moved = self.split(speeds)
+        if v is None:
+            for name, kind in self.kinds.items():
+                for coordinate, speed in kind.substrate.items():
+                    moved[name][:, kind.manifold.names.index(coordinate)] = speed
+        each = self.split(places)
+        for name, kind in self.kinds.items():
+            each[name][:] = kind.manifold.placed(each[name].copy())
+        self.check_placement(places)
+        sticks = [np.empty(0, dtype=np.bool_)]
+        for name, kind in self.kinds.items():
+            check_velocities(kind.polyhedron, each[name], moved[name], name)
+            sticks.append(kind.sticks(each[name], moved[name]).ravel())
+        return State(real("time", time, unit="s"), places, speeds, np.concatenate(sticks))
+
+    @checked
+    def check_placement(self, q: Array) -> None:
+        """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
+        for name, places in self.split(q).items():
+            check_contacts(self.kinds[name].polyhedron, places, name)
+            check_equations(self.kinds[name].polyhedron, places, name)
+        self.bodies.check_apart(self.bodies.padded(q))
+
+    @checked
+    def energies(self, state: State) -> tuple[float, float]:
+        """Return kinetic and potential energy of all bodies."""
+        kinetic = potential = 0.0
+        q, v = self.split(state.q), self.split(state.v)
+        for name in self.kinds:
+            kind = self.kinds[name]
+            for at in zip(q[name], v[name], strict=True):
+                some = energies(kind.formulation, kind.parameters, *at)
+                kinetic, potential = kinetic + some[0], potential + some[1]
+        return kinetic, potential
+
+    @checked
+    def largest_step(self, state: State) -> tuple[float, str]:
+        """Return ``2 / omega`` with the highest frequency of small motions of any body."""
+        q, v = self.split(state.q), self.split(state.v)
+        return min(leapfrog_limit(kind, q[name], v[name]) for name, kind in self.kinds.items())
+
+    def described(self) -> dict[str, Any]:
+        """Return everything that a motion depends on, by name, as plain values."""
+        told: dict[str, Any] = {"formulas": self.bodies.formula_keys, "count": dict(self.count)}
+        for name, kind in self.kinds.items():
+            known = {key: value for key, value in kind.described().items() if key != "formulas"}
+            told |= {f"{name}: {key}": value for key, value in known.items()}
+        for (one, two), family in self.between.items():
+            told |= {f"{one}-{two}: {key}": value for key, value in family.described().items()}
+        return told
