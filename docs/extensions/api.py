@@ -123,6 +123,11 @@ GROUPS = (
         {"bodies": "Joint Hinge Slider Ball Fixed Rail Planar Gear"},
     ),
     Group(
+        "Drive bodies",
+        "Springs, dampers, motors and prescribed motions.",
+        {"bodies": "Spring Damper Motor Prescribed"},
+    ),
+    Group(
         "Simulate motion",
         "Bodies with contacts, impacts and friction: a system, a start, a trajectory.",
         {

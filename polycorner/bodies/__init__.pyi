@@ -1,4 +1,5 @@
 from .arrangement import Arrangement
+from .drives import Damper, Motor, Prescribed, Spring
 from .joints import Ball, Fixed, Gear, Hinge, Joint, Planar, Rail, Slider
 from .masses import Mass, mass_of
 from .shapes import Body, Part, capsule, compound, disc, polygon, polytope, sphere
@@ -10,16 +11,20 @@ __all__ = [
     "Ball",
     "Body",
     "Cylinder",
+    "Damper",
     "Fixed",
     "Gear",
     "HalfSpace",
     "Hinge",
     "Joint",
     "Mass",
+    "Motor",
     "Part",
     "Planar",
+    "Prescribed",
     "Rail",
     "Slider",
+    "Spring",
     "box",
     "capsule",
     "compound",

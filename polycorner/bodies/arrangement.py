@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.constraints import orients
+from polycorner.bodies.drives import Drive, driven, rate_of, split
 from polycorner.bodies.dynamics import (
     between,
     energies,
@@ -19,7 +20,7 @@ from polycorner.bodies.dynamics import (
     masses_of,
     smooth,
 )
-from polycorner.bodies.joints import AnyJoint
+from polycorner.bodies.joints import WORLD, AnyJoint
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
@@ -281,7 +282,7 @@ class Arrangement(Checked):
             for function, point in within(self.manifold, name, wall, member)
         ]
 
-    def system(
+    def system(  # noqa: PLR0913 - all are options
         self,
         *,
         gravity: ArrayLike | Sequence[Any] | None = None,
@@ -292,6 +293,8 @@ class Arrangement(Checked):
         restitution: Restitution = 0.0,
         exits: Mapping[str, float] | None = None,
         count: int | Mapping[str, int] = 1,
+        drives: Mapping[str, Drive] | None = None,
+        forces: Mapping[str, Sequence[Any]] | None = None,
     ) -> System | Assembly:
         """Return the mechanical system of the bodies.
 
@@ -326,6 +329,17 @@ class Arrangement(Checked):
             As in :class:`~polycorner.System`.
         count : int, or mapping from str to int, optional
             Default 1; of several kinds for each body.
+        drives : mapping from str to Spring, Damper, Motor or Prescribed, optional
+            By names of their own.
+        forces : mapping from str to sequence of sympy.Expr or float, optional
+            For a body the components of a force at its origin, ``d`` of them, or with those of a
+            torque 3 in the plane and 6 in space, in the axes of space: functions of coordinates,
+            velocities and the time.
+
+        Notes
+        -----
+        By the name of a joint ``friction`` is a bound of the force or torque with which it resists
+        its motion (or a static and a dynamic one), and ``restitution`` that of its limits.
 
         Raises
         ------
@@ -356,10 +370,15 @@ class Arrangement(Checked):
             refuse("count", "1, or numbers by name, for several bodies", count)
         weights = masses_of(self.placements, density, {} if masses is None else masses)
         laws = energies(self.placements, weights, gravity, self.turning)
+        friction, rubbing_joints = split(friction, self.joints)
+        holders = [WORLD, *self.fixed, *self.named]
+        of_joints = self.mechanism, self.manifold, holders
+        laws, moved = driven(*of_joints, laws, drives, forces, rubbing_joints)
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
         walls = [(f.name, wall, member, point) for wall, f, member, point, _ in self.at_walls]
         meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
         meetings += [Meeting(f.name, member.body, on) for _, f, member, _, on in self.at_walls]
+        meetings += [Meeting(end, *[end.rpartition(".")[0]] * 2) for end in self.mechanism.limits]
         family, first = None, self.placements[0]
         meetings += [Meeting(f"{first.name}-{first.name}", *[first.name] * 2, True)] * (count > 1)
         known = laws_of(friction, rolling, restitution, meetings, self.named)
@@ -374,7 +393,7 @@ class Arrangement(Checked):
         return System(
             placed,
             *laws,
-            friction_of(self.manifold, touches, walls, known.friction, known.rolling),
+            friction_of(self.manifold, touches, walls, known.friction, known.rolling) + moved,
             restitution={f.name: known.restitution.get(f.name, 0.0) for f in placed.functions},
             count=count,
             between=family,
@@ -453,6 +472,11 @@ class Arrangement(Checked):
         Its sign is told at :class:`Hinge` and :class:`Slider`.
         """
         return self.mechanism.coordinate(checks.instance("name", name, str), "name").value()
+
+    def joint_rate(self, name: str) -> "sympy.Expr":
+        """Return the rate of a joint's angle or position as a formula, in the velocities too."""
+        one = self.mechanism.coordinate(checks.instance("name", name, str), "name")
+        return rate_of(self.manifold, one.slopes(self.manifold.symbols))
 
     def joint_values(self, q: ArrayLike) -> dict[str, Array]:
         """Return the angles and positions of all joints that have one, ``(...)`` at ``(..., N)``.

@@ -324,6 +324,7 @@ def between_hulls(
     return HullContacts(
         [(first, second) for first in one for second in two],
         tuple(p.manifold.size for p in placements),
+        OPTIONS.parting * scale,
         OPTIONS.touching * scale,
         lattice.lengths.tolist(),
         sum(p.body.size for p in placements) / scale,

@@ -73,13 +73,13 @@ def laws_of(
     moving = frozenset(moving)
     bounces = partial(checks.real, "restitution", least=0, most=1)
     return Laws(
-        _by_contact("friction", friction, meetings, moving, partial(_both, "friction")),
-        _by_contact("rolling", rolling, meetings, moving, partial(_both, "rolling")),
+        _by_contact("friction", friction, meetings, moving, partial(static_and_dynamic, "friction")),
+        _by_contact("rolling", rolling, meetings, moving, partial(static_and_dynamic, "rolling")),
         _by_contact("restitution", restitution, meetings, moving, bounces),
     )
 
 
-def _both(argument: str, given: Any) -> Both:
+def static_and_dynamic(argument: str, given: Any) -> Both:
     """Return the static and the dynamic one of a coefficient, which may be the same."""
     expected = "a coefficient >= 0, or a pair of a static and a smaller dynamic one"
     pair = np.array(checks.numbers(argument, given, expected), dtype=np.float64)

@@ -176,7 +176,10 @@ class _Problem:
     def of(cls, system: System, state: State) -> "_Problem":
         q, v, m = state.q, state.v, len(system.contacts)
         scales = system.manifold.scale_array
-        now = moment(system.formulation, system.parameters + state.time, q, v)
+        law = system.formulation
+        if law.is_paced:
+            refuse("system", "slips that do not depend on the time", [*law.parameters])
+        now = moment(law, law.at(system.parameters, state.time), q, v)
         gaps, rows, hessians = system.polyhedron.bundle.evaluate(q, 2)
         rates = rows @ v
         sizes = np.linalg.norm(rows * scales, axis=-1)

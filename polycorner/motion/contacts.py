@@ -37,7 +37,7 @@ def motions(manifold: Manifold) -> Manifold:
 
 
 def time_symbol() -> "sympy.Symbol":
-    """Return the symbol of the time, in s, of which ``forces`` of a system may be functions."""
+    """Return the symbol of the time, in s, of which forces and slips may be functions."""
     return _symbols([TIME])[0]
 
 
@@ -115,7 +115,8 @@ class Friction(FrictionLaw):
         Name of the contact.
     slip : sequence of sympy.Expr or SmoothFunction
         One or two components of the slip velocity, affine in the velocities ``x_dot``.  A
-        substrate that moves is a term without velocities.  Functions on :func:`motions` share
+        substrate that moves is a term without velocities, which may depend on the time
+        (:func:`time_symbol`).  Functions on :func:`motions` share
         their formulas with those of other contacts.
     static : ConvexSet
         Forces per unit load that may hold it, of as many dimensions as ``slip``.

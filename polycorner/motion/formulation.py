@@ -20,7 +20,8 @@ from polycorner.values import cached_property
 if TYPE_CHECKING:
     import sympy
 
-TIME = "time"  # name of the symbol of the time in applied forces
+TIME = "time"  # name of the symbol of the time in applied forces and slips
+STEP = "time step"  # and of the step, by half of which slips look ahead of the middle of steps
 
 
 def degree(
@@ -92,7 +93,7 @@ class Laws:
     forces : mapping from str to sympy.Expr
         Applied generalised forces, by coordinate; they may depend on the time.
     slips : tuple of sympy.Expr or SmoothFunction
-        Slip velocities ``s(q, v)``, affine in the velocities.
+        Slip velocities ``s(q, v)``, affine in the velocities; they may depend on the time.
     loads : tuple of sympy.Expr
         Known normal forces ``N(q)``.
     """
@@ -134,13 +135,23 @@ class Formulation:
     def of(cls, coordinates: Sequence[str], parameters: Sequence[str], laws: Laws) -> "Formulation":
         """Return the formulation of given laws, checking each symbol and the kinetic energy.
 
-        Where a force depends on the time, it is a further parameter.
+        Where a force or a slip depends on the time, it is a further parameter.  Forces are those in
+        the middle of a step, slips those of the velocities at its end.
         """
         import sympy
 
-        symbols = [force.free_symbols for force in laws.forces.values()]
-        driven = sympy.Symbol(TIME, real=True) in set().union(*symbols)
-        known = (*parameters, TIME) if driven else tuple(parameters)
+        time, step = (sympy.Symbol(name, real=True) for name in (TIME, STEP))
+        own = [s for s in laws.slips if not isinstance(s, SmoothFunction)]
+        paced = time in set().union(*(s.free_symbols for s in own))
+        driven = time in set().union(*(force.free_symbols for force in laws.forces.values()))
+        if paced:
+            ahead = {time: time + step / 2}
+            slips = tuple(
+                s if isinstance(s, SmoothFunction) else s.xreplace(ahead) for s in laws.slips
+            )
+            laws = replace(laws, slips=slips)
+        further = [TIME] * (driven or paced) + [STEP] * paced
+        known = (*parameters, *further)
         shared = {i: s for i, s in enumerate(laws.slips) if isinstance(s, SmoothFunction)}
         sizes = len(laws.slips), len(laws.loads)
         found = cls(tuple(coordinates), known, lambda: laws, *sizes, shared=shared)
@@ -153,6 +164,18 @@ class Formulation:
     def time_parameter(self) -> int:
         """Position of the time among the parameters; -1 if the laws do not depend on it."""
         return self.parameters.index(TIME) if TIME in self.parameters else -1
+
+    @property
+    def is_paced(self) -> bool:
+        """Whether slips depend on the time."""
+        return STEP in self.parameters
+
+    def at(self, parameters: Array, time: float = 0.0, step: float = 0.0) -> Array:
+        """Return the parameters with a time and the length of a step."""
+        told, found = {TIME: time, STEP: step}, np.array(parameters, dtype=np.float64)
+        for k, name in enumerate(self.parameters):
+            found[k] = told.get(name, found[k])
+        return found
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -252,7 +275,6 @@ class Formulation:
             "kinetic": [laws.kinetic],
             "potential": [laws.potential],
             "load": laws.loads,
-            "slip": own_slips,
         }
         for name, several in steady.items():
             for given in several:
@@ -261,7 +283,8 @@ class Formulation:
                     msg = f"{name}: expected no velocity in it; got {moving}"
                     raise ValueError(msg)
                 if degree(given, [time]):
-                    msg = f"{name}: expected no time in it, only forces may have it; got {given}"
+                    others = "only forces and slips may have it"
+                    msg = f"{name}: expected no time in it, {others}; got {given}"
                     raise ValueError(msg)
         for slip in own_slips:
             if degree(slip, v) <= 1:

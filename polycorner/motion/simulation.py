@@ -55,6 +55,7 @@ import math
 import threading
 import time
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -305,6 +306,10 @@ def start(
     names("kicks", noise.kicks, list(dict.fromkeys(every)))
     if noise.kicks and noise.kick_time:
         real("kick_time", noise.kick_time, least=dt / MOST_KICKS, unit="s")
+    if isinstance(bodies, IdenticalBodies) and bodies.body.formulation.is_paced:
+        law = bodies.body.formulation
+        paced = replace(bodies.body, parameters=law.at(bodies.body.parameters, step=dt))
+        bodies = replace(bodies, body=paced)
     return Engine(bodies, *placed, state.sticking, dt, start=state.time, noise=noise, solver=solver)
 
 

@@ -270,7 +270,8 @@ class System(MechanicalSystem):
                 refuse(argument, f"shape ({self.count}, {self.manifold.size})", array.shape)
         self.check_placement(places)
         check_velocities(self.polyhedron, places, speeds)
-        return State(real("time", time, unit="s"), places, speeds, self.sticks(places, speeds))
+        time = real("time", time, unit="s")
+        return State(time, places, speeds, self.sticks(places, speeds, time))
 
     @checked
     def check_placement(self, q: Array) -> None:
@@ -279,12 +280,13 @@ class System(MechanicalSystem):
         check_equations(self.polyhedron, q)
         self.bodies.check_apart(q.reshape(self.count, -1))
 
-    def sticks(self, q: Array, v: Array) -> NDArray[np.bool_]:
+    def sticks(self, q: Array, v: Array, time: float = 0.0) -> NDArray[np.bool_]:
         """Return for each friction contact whether its slip is zero, ``(..., F)``."""
         if not self.friction:
             return np.empty((*q.shape[:-1], 0), dtype=np.bool_)
         at = np.concatenate([q, v], axis=-1).reshape(-1, 2 * q.shape[-1])
-        slips, _ = self.formulation.slip_velocities(self.parameters, at)
+        parameters = self.formulation.at(self.parameters, time)
+        slips, _ = self.formulation.slip_velocities(parameters, at)
         starts = np.cumsum([0, *(len(f.slip) for f in self.friction)]).tolist()
         still = np.stack([~slips[:, a:b].any(axis=1) for a, b in pairwise(starts)], axis=-1)
         return np.asarray(still.reshape(*q.shape[:-1], len(self.friction)))

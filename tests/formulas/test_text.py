@@ -22,7 +22,7 @@ from polycorner import (
     minimise,
     prove,
 )
-from polycorner.bodies import Arrangement, disc
+from polycorner.bodies import Arrangement, Motor, Prescribed, Rail, box, disc
 from polycorner.dumbbells.viewer import descent
 from polycorner.files import (
     load_certificate,
@@ -126,12 +126,21 @@ CASES = {
     "random_signal.time": ("time", lambda e, _: random_signal(e, rms=1.0, band=(1.0, 2.0))),
     "random_field.x": ("x", lambda e, _: random_field(e, y, **FIELD)),
     "random_field.y": ("y", lambda e, _: random_field(x, e, **FIELD)),
+    "Rail.curve": ("curve", lambda e, _: Rail("world", "A", curve=e)),
+    "Motor.torque": ("torque", lambda e, _: Motor("J", e)),
+    "Motor.speed": ("speed", lambda e, _: Motor("J", speed=e, limit=1.0)),
+    "Prescribed.motion": ("motion", lambda e, _: Prescribed("J", e, limit=1.0)),
+    "Arrangement.system.forces": (
+        "forces",
+        lambda e, _: Arrangement({"A": disc(1.0)}, WALLS).system(forces={"A": [e, 0.0]}),
+    ),
     "Arrangement.system.gravity": (
         "gravity",
         lambda e, _: Arrangement({"disc": disc(1.0)}).system(density=1.0, gravity=[e, -9.81]),
     ),
 }
 
+WALLS = box([-5, -5], [5, 5])
 DISGUISES = {
     "text": lambda text: text,
     "text of NumPy": np.str_,

@@ -117,8 +117,8 @@ class HullContacts(Value):
     coordinates : (int, int)
         How many coordinates either body has: 2 or 3 in the plane, 3 or 7 in space, 0 if it is
         fixed.
-    zero_height : float
-        Height up to which a plane passes through two hulls.
+    through, zero : float
+        Height up to which a plane passes through two hulls, and length that is none.
     periods : sequence of float
         After which positions repeat; infinite if they do not.
     reach, position, restitution
@@ -129,7 +129,8 @@ class HullContacts(Value):
 
     pairs: Sequence[tuple[Hull, Hull]]
     coordinates: tuple[int, int]
-    zero_height: float
+    through: float
+    zero: float
     periods: Sequence[float]
     reach: float
     position: tuple[str, ...]
@@ -150,7 +151,14 @@ class HullContacts(Value):
     def table(self) -> list[float]:
         """The entries of the table; see ``geometry.py``."""
         periods = [p if np.isfinite(p) else 0.0 for p in (*self.periods, np.inf, np.inf)[:3]]
-        head = [*self.coordinates, self.zero_height, *periods, self.dimension, len(self.pairs)]
+        head = [
+            *self.coordinates,
+            self.through,
+            self.zero,
+            *periods,
+            self.dimension,
+            len(self.pairs),
+        ]
         places: dict[int, int] = {}
         parts: list[float] = []
         first, listed = len(head) + 3 * len(self.pairs), []

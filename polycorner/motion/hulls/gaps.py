@@ -7,7 +7,9 @@ The *gap* of a vertex is its greatest height over the faces of the other part: n
 outside a bound of the distance that vanishes with it.  That of two edges is the distance of the
 points where they cross, seen along the normal of the plane between the parts, or by how much they
 miss each other there, if that is more.  So gaps are continuous as long as the plane is the same,
-and none is small where nothing touches.  All close and slip along the one plane between the parts
+and none is small where nothing touches.  What is beside a face, or misses an edge, by no more than
+is a plane through both, counts as over it: where corners lie on corners, as in a stack, load does
+not pass from one to the other with every shift by a rounding error.  All close and slip along the one plane between the parts
 (:mod:`~polycorner.motion.hulls.planes`), at the point of the vertex or edge.  Where parts overlap
 the contact of the plane itself, a face and the vertex that is deepest or two edges, has the height
 of the plane, so that no overlap is without a contact.
@@ -30,9 +32,10 @@ from polycorner.motion.hulls.geometry import (
     PAIRS,
     PERIODS,
     THICKNESS,
+    THROUGH,
     TWO,
     VERTICES,
-    ZERO_HEIGHT,
+    ZERO,
     add_motion,
     back,
     beyond,
@@ -49,7 +52,7 @@ from polycorner.motion.hulls.geometry import (
     whole,
 )
 from polycorner.motion.hulls.memory import compiled, get, put
-from polycorner.motion.hulls.planes import BOTH, FIRST, SECOND, plane_between
+from polycorner.motion.hulls.planes import FIRST, SECOND, plane_between
 
 
 @compiled
@@ -77,13 +80,21 @@ def parts_of(table, s):
 
 
 @compiled
-def greatest_height(table, part, x):
-    """Return the greatest height of a point over the faces of a part, in its coordinates."""
-    most = -np.inf
+def vertex_gap(table, part, x, normal, height):
+    """Return the gap of a point at a part, out of which a normal points; all in its coordinates.
+
+    ``height`` is that of the plane between the parts.
+    """
+    most, along, nearest = -np.inf, 0.0, -np.inf
     for f in range(whole(table, part + FACES)):
         at = face_at(table, part, f)
-        most = max(most, dot(triple(table, at), x) - get(table, at + 3))
-    return most
+        n = triple(table, at)
+        above = dot(n, x) - get(table, at + 3)
+        most = max(most, above)
+        if dot(n, normal) > nearest:
+            along, nearest = above, dot(n, normal)
+    slack = get(table, THROUGH)
+    return along if most <= slack and along >= min(height, 0.0) - slack else most
 
 
 @compiled
@@ -93,16 +104,19 @@ def faces_along(table, at, normal):
 
 
 @compiled
-def edge_gap(p, u, q, v, normal, zero):
+def edge_gap(table, p, u, q, v, normal):
     """Return the gap of two edges, and where the first meets the second, from 0 to 1."""
-    w, r = cross(u, v), beyond(q, -1.0, p)
+    w, r, zero = cross(u, v), beyond(q, -1.0, p), get(table, ZERO)
     size, uu, vv = dot(w, normal), dot(u, u), dot(v, v)
     # Edges that are parallel, as seen along the normal, meet in their ends, which are vertices.
     if size * size <= zero * zero * max(uu, vv):
         return np.inf, 0.0
     s, t = dot(cross(r, v), normal) / size, dot(cross(r, u), normal) / size
     missed = abs(size) * max(max(-s, s - 1.0) / np.sqrt(vv), max(-t, t - 1.0) / np.sqrt(uu))
-    return max(dot(r, w) / size, missed), min(max(s, 0.0), 1.0)
+    apart = dot(r, w) / size
+    if missed > get(table, THROUGH):
+        apart = max(apart, missed)
+    return apart, min(max(s, 0.0), 1.0)
 
 
 @compiled
@@ -116,27 +130,65 @@ def add_row(q, table, here, along, x, row, first):
 
 
 @compiled
+def point_of(table, here, one, two, normal, g):
+    """Return the point of a contact, by its number among those of two parts."""
+    _, _, r, t = here
+    count, other = whole(table, two + VERTICES), whole(table, one + VERTICES)
+    if g < count:
+        return beyond(turned(r, triple(table, vertex_at(two, g))), 1.0, t)
+    if g < count + other:
+        return triple(table, vertex_at(one, g - count))
+    a, b = divmod(g - count - other, whole(table, two + EDGES))
+    at, there = edge_at(table, one, a), edge_at(table, two, b)
+    x, u = triple(table, at), triple(table, at + 3)
+    y, v = beyond(turned(r, triple(table, there)), 1.0, t), turned(r, triple(table, there + 3))
+    _, meets = edge_gap(table, x, u, y, v, normal)
+    return beyond(x, meets, u)
+
+
+@compiled
+def show_overlap(q, table, here, s, f, J, slopes):
+    """Give the contact of the plane between two parts its height, which is negative.
+
+    They overlap like two bars across each other, no corner inside.
+    """
+    m, _, r, t = here
+    one, two, g = parts_of(table, s)
+    height, normal, kind, i, j = plane_between(table, one, two, r, t)
+    count, other = whole(table, two + VERTICES), whole(table, one + VERTICES)
+    if kind == FIRST:
+        slot = j
+    elif kind == SECOND:
+        slot = count + j
+    else:
+        slot = count + other + i * whole(table, two + EDGES) + j
+    put(f, g + slot, height)
+    if slopes:
+        width = whole(table, ONE) + whole(table, TWO)
+        x = point_of(table, here, one, two, normal, slot)
+        add_row(q, table, here, turned(m, normal), x, J + 8 * width * (g + slot), np.int64(0))
+
+
+@compiled
 def evaluate_parts(q, table, here, s, f, J, slopes):
     """Write the gaps of two parts and, if asked for, their gradients."""
     m, _, r, t = here
     one, two, g = parts_of(table, s)
     width = whole(table, ONE) + whole(table, TWO)
-    height, normal, kind, i, j = plane_between(table, one, two, r, t)
-    along = turned(m, normal)
+    height, normal, _, _, _ = plane_between(table, one, two, r, t)
+    along, inward, least = turned(m, normal), scaled(-1.0, back(r, normal)), np.inf
     for v in range(whole(table, two + VERTICES)):
         x = beyond(turned(r, triple(table, vertex_at(two, v))), 1.0, t)
-        gap = greatest_height(table, one, x)
-        if height < 0.0 and kind == FIRST and v == j:
-            gap = min(gap, height)
+        gap = vertex_gap(table, one, x, normal, height)
+        least = min(least, gap)
         put(f, g, gap)
         if slopes:
             add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
         g += 1
     for v in range(whole(table, one + VERTICES)):
         x = triple(table, vertex_at(one, v))
-        gap = greatest_height(table, two, back(r, beyond(x, -1.0, t)))
-        if height < 0.0 and kind == SECOND and v == j:
-            gap = min(gap, height)
+        gap = vertex_gap(table, two, back(r, beyond(x, -1.0, t)), inward, height)
+        least = min(least, gap)
         put(f, g, gap)
         if slopes:
             add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
@@ -146,7 +198,6 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
     # Finite where curvature is measured: a contact that acts may be none at the next midpoint.
     none = np.inf if slopes else thickness + max(height, 0.0)
     edges, others = whole(table, one + EDGES), whole(table, two + EDGES)
-    inward = scaled(-1.0, back(r, normal))
     for b in range(others):
         at = edge_at(table, two, b)
         other = not far and faces_along(table, at, inward)
@@ -155,13 +206,14 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
             at, slot, gap, meets = edge_at(table, one, a), g + a * others + b, np.inf, 0.0
             if other and faces_along(table, at, normal):
                 x, u = triple(table, at), triple(table, at + 3)
-                gap, meets = edge_gap(x, u, y, v, normal, get(table, ZERO_HEIGHT))
-                if height < 0.0 and kind == BOTH and a == i and b == j:
-                    gap = min(gap, height)
+                gap, meets = edge_gap(table, x, u, y, v, normal)
+                least = min(least, gap)
                 if slopes and gap < np.inf:
                     x = beyond(x, meets, u)
                     add_row(q, table, here, along, x, J + 8 * width * slot, np.int64(0))
             put(f, slot, min(gap, none))
+    if least > 0.0 and height < -get(table, THROUGH):
+        show_overlap(q, table, here, s, f, J, slopes)
 
 
 @compiled
@@ -183,23 +235,6 @@ def values(q, table, f, J, H):
 def gradients(q, table, f, J, H):
     """Write the gaps of two bodies and their gradients."""
     return gaps(q, table, f, J, np.int64(1))
-
-
-@compiled
-def point_of(table, here, one, two, normal, g):
-    """Return the point of a contact, by its number among those of two parts."""
-    _, _, r, t = here
-    count, other = whole(table, two + VERTICES), whole(table, one + VERTICES)
-    if g < count:
-        return beyond(turned(r, triple(table, vertex_at(two, g))), 1.0, t)
-    if g < count + other:
-        return triple(table, vertex_at(one, g - count))
-    a, b = divmod(g - count - other, whole(table, two + EDGES))
-    at, there = edge_at(table, one, a), edge_at(table, two, b)
-    x, u = triple(table, at), triple(table, at + 3)
-    y, v = beyond(turned(r, triple(table, there)), 1.0, t), turned(r, triple(table, there + 3))
-    _, meets = edge_gap(x, u, y, v, normal, get(table, ZERO_HEIGHT))
-    return beyond(x, meets, u)
 
 
 @compiled

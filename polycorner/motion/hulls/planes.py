@@ -30,8 +30,8 @@ from polycorner.motion.hulls.geometry import (
     EDGES,
     FACES,
     THICKNESS,
+    THROUGH,
     VERTICES,
-    ZERO_HEIGHT,
     back,
     beyond,
     cross,
@@ -69,7 +69,7 @@ def plane_between(table, one, two, m, t):
     which the normal is, from the first to the second.  The numbers are a face and the vertex of the
     other part that is nearest, or two edges.
     """
-    zero = get(table, ZERO_HEIGHT)
+    slack = get(table, THROUGH)
     toward = beyond(
         beyond(turned(m, triple(table, two + CENTRE)), 1.0, t), -1.0, triple(table, one + CENTRE)
     )
@@ -87,7 +87,7 @@ def plane_between(table, one, two, m, t):
                 along = turned(m, n)
                 height, v = lowest(table, other, along)
                 height, out = height - dot(along, t) - level, scaled(-1.0, along)
-            if abs(height) <= zero:
+            if abs(height) <= slack:
                 better = not through or dot(out, toward) > nearest
                 through = True
             else:
@@ -97,7 +97,7 @@ def plane_between(table, one, two, m, t):
                 nearest = dot(out, toward)
     far = min(get(table, one + THICKNESS), get(table, two + THICKNESS))
     if not through and best < far and get(table, DIMENSION) == 3.0:
-        return edges_between(table, one, two, m, t, best + zero, (best, normal, kind, i, j))
+        return edges_between(table, one, two, m, t, best + slack, (best, normal, kind, i, j))
     return best, normal, kind, i, j
 
 
