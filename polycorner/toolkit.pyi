@@ -38,8 +38,10 @@ from .motion.random_functions import check_band, field_modes, signal_modes
 from .motion.simulation import LONGEST, SHORTEST_STEP
 from .motion.trajectory import Touch
 from .pictures.films import RATE, Picture, check_movie, movie_suffix, write_frames
+from .pictures.pages import html_page, packed, packed_contacts, page_file, three_script
 from .pictures.solids.charts import Chart, Gaps
 from .pictures.solids.grids import FEWEST_CELLS, Function
+from .pictures.solids.meshes import painted
 from .pictures.style import BODIES, SHADES, bridged
 from .polyhedra.cones import rank
 from .polyhedra.faces import project, projected
@@ -108,6 +110,7 @@ __all__ = [
     "field_modes",
     "finite",
     "flag",
+    "html_page",
     "instance",
     "load_dataset",
     "mapping",
@@ -121,6 +124,10 @@ __all__ = [
     "norm",
     "number",
     "orbits",
+    "packed",
+    "packed_contacts",
+    "page_file",
+    "painted",
     "placed_gaps",
     "placed_stationary",
     "pose",
@@ -139,6 +146,7 @@ __all__ = [
     "silent",
     "source_key",
     "steepest",
+    "three_script",
     "wave_depth",
     "waves",
     "whole",

@@ -190,8 +190,8 @@ GROUPS = (
         "Figures of sets, bodies and results.",
         {
             "pictures": "draw_region draw_arrangement draw_clusters draw_motion draw_packing "
-            "draw_critical draw_cells draw_barcode draw_landscape draw_landscape_map film_route "
-            "save",
+            "draw_critical draw_cells draw_barcode draw_landscape draw_landscape_map "
+            "film MotionFilm film_route save save_motion",
         },
     ),
     Group(

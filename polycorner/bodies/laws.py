@@ -72,9 +72,10 @@ def laws_of(
     """
     moving = frozenset(moving)
     bounces = partial(checks.real, "restitution", least=0, most=1)
+    rubs, rolls = (partial(static_and_dynamic, name) for name in ("friction", "rolling"))
     return Laws(
-        _by_contact("friction", friction, meetings, moving, partial(static_and_dynamic, "friction")),
-        _by_contact("rolling", rolling, meetings, moving, partial(static_and_dynamic, "rolling")),
+        _by_contact("friction", friction, meetings, moving, rubs),
+        _by_contact("rolling", rolling, meetings, moving, rolls),
         _by_contact("restitution", restitution, meetings, moving, bounces),
     )
 

@@ -65,7 +65,7 @@ from polycorner.checks import instance, names, real, refuse, whole
 from polycorner.errors import SolverError
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
-from polycorner.motion.bodies import MovingBodies
+from polycorner.motion.bodies import IdenticalBodies, MovingBodies
 from polycorner.motion.formulation import mass_and_forces
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import OPTIONS, Noise, Solver

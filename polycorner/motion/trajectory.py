@@ -22,6 +22,8 @@ from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, Value
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from polycorner.polyhedra.strata import Stratum
 
 ANGLES = "Angles are in radians, times in s, all else in the units of the system."
@@ -216,6 +218,40 @@ class Trajectory(Checked, Printed):
     def of_kind(self, kind: EventKind) -> list[Event]:
         """Return the events of one kind, in time."""
         return [event for event in self.events if event.kind == kind]
+
+    @checked
+    def to_xarray(self, *, units: Mapping[str, str] | None = None) -> "xr.Dataset":
+        """Return the motion as an xarray dataset, the content of ``save_trajectory``.
+
+        ``q`` and ``v`` over ``time``, ``body`` and ``coordinate``, ``gaps`` over ``time``, ``body``
+        and ``gap``, energies, contacts, events, dissipation and work by cause, with units.
+
+        Parameters
+        ----------
+        units : mapping from str to str, optional
+            Units of ``time`` (default s), ``energy``, ``force``, ``impulse`` and ``gap`` (default
+            that of the contacts' functions); those of coordinates are the manifold's.
+
+        Raises
+        ------
+        TypeError, ValueError
+            For the motion of no :class:`~polycorner.System`, or units of other things.
+
+        Examples
+        --------
+        >>> from polycorner import Manifold, Polyhedron, System, simulate, velocities
+        >>> M = Manifold.euclidean("x y")
+        >>> x, y = M.symbols
+        >>> vx, vy = velocities(M)
+        >>> ball = System(Polyhedron(M, {"floor": y}), (vx**2 + vy**2) / 2, 10 * y)
+        >>> data = simulate(ball, ball.state([0.0, 1.0]), 0.1, 0.01).to_xarray()
+        >>> round(float(data.q.sel(coordinate="y", time=0.1).item()), 3)
+        0.95
+        """
+        # The one way up: people look for the method here, and the dataset is that of files.
+        from polycorner.files.trajectories import trajectory_dataset
+
+        return trajectory_dataset(self, units=units)
 
     @checked
     def stratum(self, index: int, *, tolerance: float = 1e-6) -> "Stratum":

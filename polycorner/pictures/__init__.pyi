@@ -2,8 +2,10 @@ from .arrangements import draw_arrangement
 from .barcodes import draw_barcode
 from .clusters import draw_clusters, draw_motion
 from .disks import draw_critical
+from .exports import save_motion
 from .landscape_maps import draw_landscape_map
 from .landscapes import draw_landscape
+from .motion_films import MotionFilm, film
 from .packings import draw_packing
 from .parameter_boxes import draw_cells
 from .regions import draw_region
@@ -24,6 +26,7 @@ from .style import save
 
 __all__ = [
     "Isosurface",
+    "MotionFilm",
     "SharpSurface",
     "View",
     "components_of_complement",
@@ -38,10 +41,12 @@ __all__ = [
     "draw_packing",
     "draw_region",
     "draw_solid",
+    "film",
     "film_route",
     "isosurface",
     "place_solid",
     "save",
+    "save_motion",
     "sharp_surface",
     "visible",
     "write_mesh",

@@ -1,34 +1,44 @@
 """Figures of rigid bodies in their places, in the plane and in space."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.colors import LightSource, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from matplotlib.patheffects import withStroke
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import ArrayLike
-from scipy.spatial import ConvexHull
 
 from polycorner.bodies.arrangement import Arrangement
-from polycorner.bodies.shapes import Body, Part
-from polycorner.bodies.walls import Cylinder, HalfSpace
-from polycorner.checks import instance, refuse, whole
+from polycorner.bodies.frames import AXES
+from polycorner.bodies.lattices import Lattice
+from polycorner.bodies.motions import Poses, poses_of
+from polycorner.bodies.shapes import Body
+from polycorner.bodies.surfaces import outline, surface
+from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
+from polycorner.checks import refuse, whole
 from polycorner.kinds import checked
+from polycorner.pictures import arguments
+from polycorner.polyhedra.strata import stratum_at
+from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 COLOURS = ("#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#F0E442", "#0072B2", "#D55E00")
-FIXED, OUTSIDE, OUTLINE = "0.55", "0.85", "0.2"
-CELL = 2.4  # width of a picture in inches
+FIXED, OUTSIDE, OUTLINE, MARK = "0.55", "0.85", "0.2", "#C00000"
+CELL, ALONE = 2.4, 5.5  # width of a picture in inches, beside others and alone
+MOST_NAMES = 20  # bodies whose names are written
 MARGIN = 0.15  # around bodies, of their extent
-ARC = 33  # points of a full circle of an outline
+ROOM = 2.0  # a round wall that is larger than this many times what is in it is not seen whole
 WALL = 360  # points of the inside of a circle or cylinder
-BALL = 300  # points of a ball
+ARROW = 0.3  # length of that of the largest force, of half the window
 LIGHT = LightSource(azdeg=315, altdeg=50)
 
 
@@ -39,82 +49,137 @@ def draw_arrangement(
     *,
     titles: Sequence[str] | None = None,
     columns: int = 4,
+    axes: bool | None = None,
+    names: bool | None = None,
+    contacts: bool | ArrayLike | None = None,
+    forces: ArrayLike | None = None,
 ) -> Figure:
     """Draw the bodies at one point or several, side by side at the same scale.
 
-    Bodies have different colours, fixed ones are grey.  In the plane the outside of walls is grey;
-    in space walls are not drawn.  A periodic box has dashed sides; in the plane all images are
-    drawn that are seen, in space those whose origins are in the box.
+    Bodies have different colours, fixed ones are grey.  In the plane the outside of walls is grey,
+    and discs whose rotation is a coordinate have a radius; in space walls are outlines.  A periodic
+    box has dashed sides; in the plane all images are drawn that are seen, in space those whose
+    origins are in the box.
 
     Parameters
     ----------
     arrangement : Arrangement
-    points : (N,) or (k, N) array
+    points : (N,), (T, N) or (T, n, k) array
+        The last for ``n`` bodies like one, such as ``path.q[[-1]]`` of a motion.
     titles : sequence of str, optional
-        One for each point.
+        One for each picture.
     columns : int, optional
         Largest number side by side.
+    axes, names : bool, optional
+        Whether there are coordinates around a picture, and names on bodies; default where there is
+        one picture, and names for up to 20 bodies.
+    contacts : bool or (m, d) array, optional
+        Points that are marked.  True for those of the contacts that are closed at the points; they
+        have to be ``(N,)`` or ``(T, N)`` then.
+    forces : (m, d) array, optional
+        Forces at the contacts of a single picture, drawn as arrows.
 
     Raises
     ------
     TypeError, ValueError
-        For points of another manifold, or another number of titles.
+        For points of another manifold, another number of titles, or forces that do not belong to
+        contacts.
     """
-    instance("arrangement", arrangement, Arrangement)
-    places = np.atleast_2d(arrangement.manifold.points(points, "points"))
-    if titles is not None and len(titles) != len(places):
-        refuse("titles", f"{len(places)} titles, one for each point", len(titles))
-    columns = min(whole("columns", columns, least=1), len(places))
-    rows = math.ceil(len(places) / columns)
-    figure = Figure(figsize=(CELL * columns, (CELL + 0.2) * rows), layout="constrained")
-    space = {"projection": "3d"} if arrangement.dimension == 3 else {}
+    poses = poses_of(arrangement, points, "points")
+    count, d = len(poses), arrangement.dimension
+    if titles is not None and len(titles) != count:
+        refuse("titles", f"{count} titles, one for each point", len(titles))
+    columns = min(whole("columns", columns, least=1), count)
+    marks = _marks(poses, points, contacts)
+    pushes = None if forces is None else finite(arguments.points("forces", forces, d), "forces")
+    if pushes is not None and (count > 1 or pushes.shape != marks[0].shape):
+        refuse("forces", "one for each of the contacts of a single picture", forces)
+    rows, cell = math.ceil(count / columns), ALONE if count == 1 else CELL
+    window = window_of(poses)
+    figure = Figure(figsize=(cell * columns, (cell + 0.2) * rows), layout="constrained")
+    space = {"projection": "3d", "computed_zorder": False} if d == 3 else {}
     grid = figure.subplots(rows, columns, squeeze=False, subplot_kw=space)
-    placed = [_in_the_box(arrangement, arrangement.placed(q)) for q in places]
-    window = _window(arrangement, [body for bodies in placed for body in bodies.values()])
-    for k, axes in enumerate(grid.flat):
-        axes.set_axis_off()
-        if k < len(placed):
-            draw = _draw_space if arrangement.dimension == 3 else _draw_plane
-            draw(axes, arrangement, placed[k], window)
+    named = count == 1 and len(poses.kinds) <= MOST_NAMES if names is None else names
+    for k, pane in enumerate(grid.flat):
+        framed = k < count and (count == 1 if axes is None else axes)
+        pane.set_axis_off() if not framed else _label(pane, arrangement)
+        if k < count:
+            (draw_space if d == 3 else draw_plane)(pane, poses, k, window)
+            _annotate(pane, poses.placed(k) if named else {}, marks[k], pushes, window)
             if titles is not None:
-                axes.set_title(titles[k], fontsize=9)
+                pane.set_title(titles[k], fontsize=9)
     return figure
 
 
-def _in_the_box(arrangement: Arrangement, placed: dict[str, Body]) -> dict[str, Body]:
-    """Return bodies displaced by whole periods so that the means of their points are in the box."""
-    lattice = arrangement.lattice
-    return {
-        name: body.moved(
-            lattice.shift(tuple(-np.floor(body.markers.mean(axis=0) / lattice.lengths)))
-        )
-        for name, body in placed.items()
-    }
+def _marks(poses: Poses, points: ArrayLike, contacts: Any) -> list[Array]:
+    """Return the points ``(m, d)`` that are marked in each picture."""
+    d, count = poses.arrangement.dimension, len(poses)
+    if contacts is None or contacts is False:
+        return [np.empty((0, d))] * count
+    if contacts is not True:
+        if count > 1:
+            refuse("contacts", "True for several pictures, or points of a single one", contacts)
+        return [finite(arguments.points("contacts", contacts, d), "contacts")]
+    if np.ndim(points) > 2:
+        refuse("contacts", "points (m, d), where bodies are repeated", contacts)
+    places = np.atleast_2d(np.asarray(points, dtype=np.float64))
+    polyhedron = poses.arrangement.polyhedron
+    closed = [stratum_at(polyhedron, q, tolerance=DEFAULT.same).active for q in places]
+    touching = tuple(tuple(((0,), name, 0.0) for name in some) for some in closed)
+    seen = poses.touched(touching)
+    return [seen.marks(k) for k in range(count)]
 
 
-def _window(arrangement: Arrangement, bodies: Sequence[Body]) -> Array:
+# ------------------------------------------------------------------------------------- the window
+
+
+def window_of(poses: Poses) -> Array:
     """Return two opposite corners ``(2, d)`` of a cube around all bodies, or the box around them.
 
-    The box is that of periods, or of pairs of walls across an axis, which are drawn in the plane.
+    The box is that of periods, or of pairs of walls across an axis.
     """
-    parts = [part for body in bodies for part in body.parts.values()]
-    low = np.min([part.points.min(axis=0) - part.radius for part in parts], axis=0)
-    high = np.max([part.points.max(axis=0) + part.radius for part in parts], axis=0)
+    arrangement = poses.arrangement
+    low, high = extent_of(poses)
     lengths = arrangement.lattice.lengths
     periodic = np.isfinite(lengths)
     low, high = np.where(periodic, 0.0, low), np.where(periodic, lengths, high)
-    if arrangement.dimension == 2:
-        below, above = _between_walls(arrangement)
-        boxed = np.isfinite(above - below)
-        low = np.where(boxed, np.minimum(low, below), low)
-        high = np.where(boxed, np.maximum(high, above), high)
+    below, above = _between_walls(arrangement)
+    boxed = np.isfinite(above - below)
+    low = np.where(boxed, np.minimum(low, below), low)
+    high = np.where(boxed, np.maximum(high, above), high)
+    for wall in arrangement.walls.values():
+        if isinstance(wall, Cylinder) and 2 * wall.radius < ROOM * (high - low).max():
+            across = np.ones(len(low)) if wall.axis is None else np.sqrt(1 - wall.axis**2)
+            low = np.minimum(low, np.where(across > 0, wall.point - across * wall.radius, low))
+            high = np.maximum(high, np.where(across > 0, wall.point + across * wall.radius, high))
     half = (0.5 + MARGIN) * (high - low).max()
     return np.array([(low + high) / 2 - half, (low + high) / 2 + half])
 
 
+def extent_of(poses: Poses) -> tuple[Array, Array]:
+    """Return the lowest and highest coordinates of bodies that are there at any instant."""
+    lows, highs = [], []
+    for kind, body in enumerate(poses.arrangement.named.values()):
+        own = poses.kinds == kind
+        here = poses.present[:, own]
+        origins, matrices = poses.boxed[:, own][here], poses.matrices[:, own][here]
+        for part in body.parts.values() if len(origins) else ():
+            places = origins[:, None] + np.einsum("mij,pj->mpi", matrices, part.points)
+            lows.append(places.min(axis=(0, 1)) - part.radius)
+            highs.append(places.max(axis=(0, 1)) + part.radius)
+    for body in poses.arrangement.fixed.values():
+        for part in body.parts.values():
+            lows.append(part.points.min(axis=0) - part.radius)
+            highs.append(part.points.max(axis=0) + part.radius)
+    if not lows:
+        refuse("motion", "at least one body that is there", "none")
+    return np.min(lows, axis=0), np.max(highs, axis=0)
+
+
 def _between_walls(arrangement: Arrangement) -> tuple[Array, Array]:
     """Return where walls across each axis are, on either side; infinite where there is none."""
-    below, above = np.full(2, -np.inf), np.full(2, np.inf)
+    d = arrangement.dimension
+    below, above = np.full(d, -np.inf), np.full(d, np.inf)
     for wall in arrangement.walls.values():
         if isinstance(wall, HalfSpace) and np.abs(wall.normal).max() > 1 - DEFAULT.alike:
             axis = int(np.abs(wall.normal).argmax())
@@ -125,30 +190,94 @@ def _between_walls(arrangement: Arrangement) -> tuple[Array, Array]:
     return below, above
 
 
-def _colours(arrangement: Arrangement) -> dict[str, str]:
-    moving = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(arrangement.named)}
-    return moving | dict.fromkeys(arrangement.fixed, FIXED)
+def colours_of(poses: Poses) -> dict[str, str]:
+    """Return a colour for each body: one for each kind, and grey for fixed ones."""
+    moving = {
+        name: COLOURS[kind % len(COLOURS)]
+        for name, kind in zip(poses.names, poses.kinds.tolist(), strict=True)
+    }
+    return moving | dict.fromkeys(poses.arrangement.fixed, FIXED)
 
 
-def _draw_plane(
-    axes: Axes, arrangement: Arrangement, placed: dict[str, Body], window: Array
-) -> None:
+# --------------------------------------------------------------------------------------- the plane
+
+
+def draw_plane(axes: Axes, poses: Poses, k: int, window: Array) -> None:
+    """Draw the bodies at an instant, and what is around them, in the plane."""
     low, high = window
+    draw_around(axes, poses.arrangement, window)
+    for colour, shapes, radii in outlines(poses, k, window):
+        for shape in shapes:
+            axes.add_patch(Polygon(shape, facecolor=colour, edgecolor=OUTLINE, linewidth=0.8))
+        axes.add_collection(LineCollection([*radii], colors=OUTLINE, linewidths=0.8))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+
+
+def draw_around(axes: Axes, arrangement: Arrangement, window: Array) -> None:
+    """Draw walls and the sides of a periodic box in the plane."""
     for wall in arrangement.walls.values():
         _draw_wall(axes, wall, window)
-    for name, colour in _colours(arrangement).items():
-        for image in arrangement.lattice.copies(placed[name], low, high):
-            for part in image.parts.values():
-                outline = _outline(part)
-                axes.add_patch(Polygon(outline, facecolor=colour, edgecolor=OUTLINE, linewidth=0.8))
     for axis in arrangement.lattice.axes:
         for place in (0.0, arrangement.lattice.lengths[axis]):
             draw = axes.axvline if axis == 0 else axes.axhline
             draw(place, color=OUTLINE, linestyle="--", linewidth=0.8)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
 
 
-def _draw_wall(axes: Axes, wall: HalfSpace | Cylinder, window: Array) -> None:
+def outlines(poses: Poses, k: int, window: Array) -> Iterator[tuple[str, Array, Array]]:
+    """Yield the outlines that are seen at an instant, by parts: those of all bodies of a kind.
+
+    Yields
+    ------
+    colour : str
+    outlines : (m, c, 2) array
+    radii : (m, 2, 2) or (0, 2, 2) array
+        Which show how discs are turned, where that is a coordinate.
+    """
+    tints, turning, lattice = colours_of(poses), turns(poses), poses.arrangement.lattice
+    for kind, body in enumerate(poses.arrangement.named.values()):
+        there = np.flatnonzero((poses.kinds == kind) & poses.present[k])
+        if not len(there):
+            continue
+        first = poses.names[there[0]]
+        places = [poses.boxed[k, there] + shift for shift in _shifts(lattice, body, window)]
+        origins = np.concatenate(places)
+        matrices = np.tile(poses.matrices[k, there], (len(places), 1, 1))
+        for part in body.parts.values():
+            shapes = _carried(origins, matrices, outline(part))
+            radii = _carried(origins, matrices, part.points[0] + np.diag([0, part.radius])[:, ::-1])
+            low, high = shapes.min(axis=1), shapes.max(axis=1)
+            seen = ((high >= window[0]) & (low <= window[1])).all(axis=1)
+            yield tints[first], shapes[seen], radii[seen & (first in turning)]
+    for name, body in poses.arrangement.fixed.items():
+        for image in lattice.copies(body, *window):
+            for part in image.parts.values():
+                yield tints[name], outline(part)[None], np.empty((0, 2, 2))
+
+
+def _carried(origins: Array, matrices: Array, points: Array) -> Array:
+    """Return points ``(c, d)`` of several bodies in their places, ``(m, c, d)``."""
+    return np.asarray(origins[:, None] + np.einsum("mij,cj->mci", matrices, points))
+
+
+def _shifts(lattice: Lattice, body: Body, window: Array) -> Iterator[Array]:
+    """Yield displacements of images that may be seen of a body in the box."""
+    ranges = [range(1)] * len(lattice.lengths)
+    for axis in lattice.axes:
+        length, reach = lattice.lengths[axis], 2 * body.size
+        least = math.floor((window[0, axis] - length - reach) / length)
+        ranges[axis] = range(least, math.ceil((window[1, axis] + reach) / length) + 1)
+    for whole_periods in product(*ranges):
+        yield lattice.shift(whole_periods)
+
+
+def turns(poses: Poses) -> dict[str, int]:
+    """Return the numbers of the bodies that are round and turn, by name."""
+    spins = [p.spins and p.is_round for p in poses.arrangement.placements]
+    kinds = poses.kinds.tolist()
+    return {name: k for k, name in enumerate(poses.names) if spins[kinds[k]]}
+
+
+def _draw_wall(axes: Axes, wall: Wall, window: Array) -> None:
     """Draw the outside of a wall in grey."""
     middle, size = window.mean(axis=0), 2 * float(np.ptp(window[:, 0]))
     if isinstance(wall, HalfSpace):
@@ -158,55 +287,126 @@ def _draw_wall(axes: Axes, wall: HalfSpace | Cylinder, window: Array) -> None:
         area = np.concatenate([ends, ends[::-1] - size * wall.normal])
         axes.add_patch(Polygon(area, facecolor=OUTSIDE, edgecolor=OUTLINE, linewidth=0.8))
         return
-    axes.add_patch(Polygon(_corners(middle, size), facecolor=OUTSIDE))
+    corners = middle + size * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    axes.add_patch(Polygon(corners, facecolor=OUTSIDE))
+    axes.add_patch(Polygon(circle_of(wall), facecolor="white", edgecolor=OUTLINE, linewidth=0.8))
+
+
+def circle_of(wall: Cylinder) -> Array:
+    """Return the points ``(k, d)`` of a round wall across its axis, all around once."""
     azimuth = np.linspace(0, math.tau, WALL, endpoint=False)
-    waves = (a * np.cos(k * azimuth + p) for k, (a, p) in wall.waves.items())
-    radius = wall.radius + sum(waves, np.zeros(WALL))
-    curve = wall.point + radius[:, None] * np.column_stack([np.cos(azimuth), np.sin(azimuth)])
-    axes.add_patch(Polygon(curve, facecolor="white", edgecolor=OUTLINE, linewidth=0.8))
+    radius = wall.radius + sum(
+        (a * np.cos(k * azimuth + p) for k, (a, p) in wall.waves.items()), np.zeros(WALL)
+    )
+    first, second = wall.around if wall.dimension == 2 or wall.axis is not None else np.eye(3)[:2]
+    around = np.cos(azimuth)[:, None] * first + np.sin(azimuth)[:, None] * second
+    return np.asarray(wall.point + radius[:, None] * around)
 
 
-def _corners(middle: Array, size: float) -> Array:
-    return np.asarray(middle + size * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]))
+# ----------------------------------------------------------------------------------------- space
 
 
-def _outline(part: Part) -> Array:
-    """Return the hull of circles around the points, counterclockwise ``(k, 2)``."""
-    if part.radius == 0:
-        return part.points
-    angles = np.linspace(0, math.tau, ARC)
-    circle = part.radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    cloud = (part.points[:, None] + circle).reshape(-1, 2)
-    return np.asarray(cloud[ConvexHull(cloud).vertices])
-
-
-def _draw_space(
-    axes: Any, arrangement: Arrangement, placed: dict[str, Body], window: Array
-) -> None:
+def draw_space(axes: Any, poses: Poses, k: int, window: Array) -> None:
+    """Draw the bodies at an instant, and outlines of walls, in space."""
     low, high = window
-    for name, colour in _colours(arrangement).items():
-        for part in placed[name].parts.values():
-            triangles, normals = _surface(part)
-            tint = np.array(to_rgb(colour))
-            shade = LIGHT.shade_normals(normals, fraction=1.0)[:, None]
-            faces = tint * (0.35 + 0.65 * shade)
-            axes.add_collection3d(Poly3DCollection(triangles, facecolors=faces, edgecolors="none"))
+    tints, shades = colours_of(poses), []
+    triangles: list[Array] = []
+    for name, body in poses.placed(k).items():
+        for part in body.parts.values():
+            vertices, faces, normals = surface(part)
+            seen = normals[faces].mean(axis=1)
+            shade = LIGHT.shade_normals(seen, fraction=1.0)[:, None]
+            triangles.append(vertices[faces])
+            shades.append(np.array(to_rgb(tints[name])) * (0.35 + 0.65 * shade))
+    # One collection, since matplotlib sorts by depth within collections only.
+    drawn = Poly3DCollection(
+        np.concatenate(triangles), facecolors=np.concatenate(shades), edgecolors="none", zorder=2
+    )
+    axes.add_collection3d(drawn)
+    lines = wall_lines(poses.arrangement, window)
+    axes.add_collection3d(Line3DCollection(lines, colors=FIXED, linewidths=0.7, zorder=1))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect((1, 1, 1), zoom=1.5)
+    axes.set_box_aspect((1, 1, 1), zoom=0.95 if axes.axison else 1.5)
 
 
-def _surface(part: Part) -> tuple[Array, Array]:
-    """Return triangles ``(k, 3, 3)`` of the surface and their normals ``(k, 3)``."""
-    cloud = part.points
-    if part.radius > 0:
-        cloud = (part.points[:, None] + part.radius * _ball()).reshape(-1, 3)
-    hull = ConvexHull(cloud)
-    return cloud[hull.simplices], hull.equations[:, :3]
+def wall_lines(arrangement: Arrangement, window: Array) -> list[Array]:
+    """Return outlines ``(k, 3)`` of walls and of a periodic box in space, within a window."""
+    low, high = window
+    below, above = _between_walls(arrangement)
+    lengths = arrangement.lattice.lengths
+    below = np.where(np.isfinite(lengths), 0.0, np.maximum(below, low))
+    above = np.where(np.isfinite(lengths), lengths, np.minimum(above, high))
+    found = []
+    for wall in arrangement.walls.values():
+        if isinstance(wall, HalfSpace):
+            found.append(_section(wall, below, above))
+        elif wall.axis is None:
+            for turned in np.eye(3):
+                circle = circle_of(Cylinder(wall.radius, axis=turned, point=wall.point))
+                found.append(np.concatenate([circle, circle[:1]]))
+        else:
+            found += _tube(wall, low, high)
+    for axis in arrangement.lattice.axes:
+        for sign in (1.0, -1.0):
+            normal = sign * np.eye(3)[axis]
+            found.append(_section(HalfSpace(normal, below if sign > 0 else above), below, above))
+    return [line for line in found if len(line)]
 
 
-def _ball() -> Array:
-    """Return points of the unit sphere along a spiral."""
-    k = np.arange(BALL) + 0.5
-    height, angle = 1 - 2 * k / BALL, k * math.pi * (3 - math.sqrt(5))
-    width = np.sqrt(1 - height**2)
-    return np.column_stack([width * np.cos(angle), width * np.sin(angle), height])
+def _section(wall: HalfSpace, low: Array, high: Array) -> Array:
+    """Return the closed polygon in which a plane cuts a box."""
+    corners = np.array([[(low, high)[k >> a & 1][a] for a in range(3)] for k in range(8)])
+    heights = (corners - wall.point) @ wall.normal
+    on = abs(heights) <= DEFAULT.alike * np.ptp(corners)
+    found = [*corners[on]]
+    for i in range(8):
+        for j in (i | 1, i | 2, i | 4):
+            if i < j and not (on[i] or on[j]) and heights[i] * heights[j] < 0:
+                share = heights[i] / (heights[i] - heights[j])
+                found.append(corners[i] + share * (corners[j] - corners[i]))
+    if len(found) < 3:
+        return np.empty((0, 3))
+    points = np.array(found)
+    away = points - points.mean(axis=0)
+    first = away[0] / np.linalg.norm(away[0])
+    order = np.argsort(np.arctan2(away @ np.cross(wall.normal, first), away @ first))
+    return np.asarray(points[[*order, order[0]]])
+
+
+def _tube(wall: Cylinder, low: Array, high: Array) -> Iterator[Array]:
+    """Yield two circles of a cylinder, where it leaves a box, and four lines between them."""
+    assert wall.axis is not None
+    reach = abs(wall.axis) @ (high - low) / 2
+    middle = ((low + high) / 2 - wall.point) @ wall.axis
+    ends = [circle_of(wall) + (middle + side * reach) * wall.axis for side in (-1, 1)]
+    yield from (np.concatenate([end, end[:1]]) for end in ends)
+    yield from np.stack(ends, axis=1)[:: WALL // 4]
+
+
+# ------------------------------------------------------------------------------- what is beside it
+
+
+def _label(axes: Any, arrangement: Arrangement) -> None:
+    unit = f" ({arrangement.unit})" if arrangement.unit else ""
+    letters = AXES[: arrangement.dimension]
+    axes.set(**{f"{letter}label": f"{letter}{unit}" for letter in letters})
+
+
+def _annotate(
+    axes: Any, named: Mapping[str, Body], marks: Array, forces: Array | None, window: Array
+) -> None:
+    """Write names on bodies, mark contacts, and draw forces as arrows."""
+    halo = [withStroke(linewidth=2.5, foreground="white", alpha=0.8)]
+    words: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": halo, "zorder": 8}
+    for name, body in named.items():
+        axes.text(*body.markers.mean(axis=0), name, fontsize=10, **words)
+    if len(marks):
+        axes.plot(*marks.T, "o", color=MARK, mec="white", mew=0.6, ms=5, ls="", zorder=7)
+    if forces is None or not len(forces) or not (largest := np.linalg.norm(forces, axis=1).max()):
+        return
+    arrows = ARROW * float(np.ptp(window[:, 0])) / 2 / largest * forces
+    if len(window[0]) == 3:
+        axes.quiver(*marks.T, *arrows.T, color=MARK, linewidth=1.6, zorder=9)
+    else:
+        style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "zorder": 9}
+        axes.quiver(*marks.T, *arrows.T, color=MARK, width=0.006, **style)

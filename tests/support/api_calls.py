@@ -91,6 +91,7 @@ VALUES = {
     "Family": lambda: of.energy().family,
     "Film": of.film,
     "Friction": of.friction,
+    "MotionFilm": lambda: pictures.film(of.arrangement(), [[0.0, 0.0, 3.0, 0.0]]),
     "Grid": lambda: sweeps.Grid.of({"size": [1.0, 2.0]}),
     "HalfSpace": lambda: bodies.HalfSpace([0.0, 1.0], ORIGIN),
     "Immobility": lambda: minimisation.immobility(of.square(), ORIGIN),
@@ -188,7 +189,7 @@ ALIKE = (  # arguments, and what takes them
         """Arrangement.system Body.moved Certificate.explain Certificate.holds CornerList.skeleton
         JammedPacking.near_gaps Manifold.matrix Manifold.vector Nerve.betti
         Nerve.euler_characteristic PeriodicPacking.scattered StationaryList.certificates
-        TorusDisks.critical_search Tutorial.sides""",
+        TorusDisks.critical_search Trajectory.to_xarray Tutorial.sides""",
     ),
 )
 

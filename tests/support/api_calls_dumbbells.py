@@ -197,6 +197,12 @@ DUMBBELLS = {
         "resolution": 20,
     },
     "pictures.draw_solid": lambda: {"mesh": of.isosurface().mesh},
+    "pictures.film": lambda: {
+        "arrangement": of.arrangement(),
+        "motion": [[0.0, 0.0, 3.0, 0.0]],
+        "size": 40,
+    },
+    "MotionFilm.save": lambda: {"path": of.new("film.gif")},
     "pictures.film_route": lambda: {
         "landscape": double_well(),
         "route": double_well().passes[0].sides[0].route,
@@ -213,6 +219,11 @@ DUMBBELLS = {
         "palette": {},
     },
     "pictures.save": lambda: {"figure": of.figure(), "path": of.new("figure.png")},
+    "pictures.save_motion": lambda: {
+        "arrangement": of.arrangement(),
+        "motion": [[0.0, 0.0, 3.0, 0.0]],
+        "path": of.new("motion.xyz"),
+    },
     "pictures.sharp_surface": lambda: {"gaps": of.gaps, "bounds": of.AROUND, "resolution": 8},
     "pictures.visible": lambda: {
         "mesh": of.isosurface().mesh,

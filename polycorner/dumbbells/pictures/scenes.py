@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import to_rgba
 from numpy.typing import ArrayLike
 
 from polycorner.dumbbells.drum import DumbbellDrum
@@ -29,7 +28,16 @@ from polycorner.dumbbells.pictures.solid import relative_corners, relative_curve
 from polycorner.dumbbells.pictures.symbols import CONTACT, HANDS, KIND_WORDS, KINDS
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.polyhedra import stratum_at
-from polycorner.toolkit import BODIES, Array, checked, finite, reals, refuse, write_atomically
+from polycorner.toolkit import (
+    BODIES,
+    Array,
+    checked,
+    finite,
+    painted,
+    reals,
+    refuse,
+    write_atomically,
+)
 
 if TYPE_CHECKING:
     import trimesh
@@ -183,28 +191,6 @@ def write_scene(scene: "trimesh.Scene", path: Path) -> Path:
 # ------------------------------------------------------------------------------------- materials
 
 
-def _painted(
-    mesh: Any, colour: str, *, opacity: float = 1.0, rough: float = 0.55
-) -> "trimesh.Trimesh":
-    """Give a mesh a material of one colour, not metallic, since there is nothing to reflect."""
-    made = library().visual
-    material = made.material.PBRMaterial(
-        baseColorFactor=[*map(_linear, to_rgba(colour)[:3]), round(255 * opacity)],
-        metallicFactor=0.0,
-        roughnessFactor=rough,
-        doubleSided=opacity < 1,
-        alphaMode="BLEND" if opacity < 1 else "OPAQUE",
-    )
-    mesh.visual = made.TextureVisuals(material=material)
-    painted: trimesh.Trimesh = mesh
-    return painted
-
-
-def _linear(part: float) -> int:
-    """Return a component of an sRGB colour as linear light from 0 to 255, as in GLB files."""
-    return round(255 * (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4))
-
-
 def solid_mesh(mesh: "trimesh.Trimesh", stretch: Array) -> "trimesh.Trimesh":
     """Return a painted, slightly translucent copy of a mesh, its coordinates multiplied.
 
@@ -217,12 +203,12 @@ def solid_mesh(mesh: "trimesh.Trimesh", stretch: Array) -> "trimesh.Trimesh":
     kept, corners = np.unique(keys.astype(np.int64), axis=0, return_inverse=True)
     made = library().Trimesh(vertices[kept[:, 0]], corners.reshape(faces.shape), process=False)
     _ = made.vertex_normals  # cached, so that they are exported
-    return _painted(made, SOLID, opacity=0.8, rough=0.9)
+    return painted(made, SOLID, opacity=0.8, rough=0.9)
 
 
 def tube(points: ArrayLike, radius: float, colour: str) -> "trimesh.Trimesh":
     """Return a polyline ``(k, 3)`` as a closed tube of one colour."""
-    return _painted(library().Trimesh(*tube_surface(points, radius), process=False), colour)
+    return painted(library().Trimesh(*tube_surface(points, radius), process=False), colour)
 
 
 # ----------------------------------------------------------------------------------------- parts
@@ -249,7 +235,7 @@ def _shapes(pair: DumbbellPair, colour: str) -> tuple[Any, Any]:
     ball = made.icosphere(subdivisions=ROUND, radius=pair.ball_radius)
     _ = ball.vertex_normals
     rod = made.cylinder(radius=pair.rod_radius, height=pair.length, sections=32)
-    return _painted(ball, colour), _painted(rod, colour)
+    return painted(ball, colour), painted(rod, colour)
 
 
 def _add(scene: Any, node: str, name: str, mesh: Any, place: Array) -> None:
@@ -277,12 +263,12 @@ def _along(ends: Array) -> Array:
 
 def _add_mark(scene: "trimesh.Scene", node: str, point: Array, ball_radius: float) -> None:
     mark = library().creation.icosphere(subdivisions=2, radius=0.18 * ball_radius)
-    _add(scene, node, "contact", _painted(mark, CONTACT), _moved(point))
+    _add(scene, node, "contact", painted(mark, CONTACT), _moved(point))
 
 
 def _add_corner(scene: "trimesh.Scene", k: int, point: Array, hand: str, radius: float) -> None:
     mark = library().creation.icosphere(subdivisions=2, radius=radius)
-    _add(scene, f"corner {k + 1} {hand}", f"corner {hand}", _painted(mark, HANDS[hand]),
+    _add(scene, f"corner {k + 1} {hand}", f"corner {hand}", painted(mark, HANDS[hand]),
          _moved(point))  # fmt: skip
 
 
@@ -305,4 +291,4 @@ def wall_mesh(wall: WallPatch) -> "trimesh.Trimesh":
     k = 2 * np.arange(len(u) - 1)[:, None]
     faces = np.concatenate([k + np.array([0, 2, 1]), k + np.array([1, 2, 3])])
     mesh = library().Trimesh(vertices, faces, process=False)
-    return _painted(mesh, WALL, opacity=0.6, rough=1.0)
+    return painted(mesh, WALL, opacity=0.6, rough=1.0)

@@ -18,10 +18,10 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.scenes import solid_bytes
 from polycorner.dumbbells.viewer.board import Board
-from polycorner.dumbbells.viewer.page import page_file, three_script
+from polycorner.dumbbells.viewer.page import own_file
 from polycorner.dumbbells.viewer.server import allowed, names_of
 from polycorner.dumbbells.viewer.sliders import MESSAGE, UnknownMessageError, hello, parsed
-from polycorner.toolkit import checked
+from polycorner.toolkit import checked, page_file, three_script
 
 RATE = 300  # most messages of a page in a second
 PAGES = 16  # most live pages at a time
@@ -204,8 +204,9 @@ class _Live(WebSocketHandler):
 def live_application(pair: DumbbellPair, host: str) -> Application:
     """Return the application of the live page of a pair, with its kernels compiled."""
     Board.of(pair).fall()
-    texts = {name: page_file(name) for name in ("stage.js", "board.js", "page.css")}
-    texts |= {"": page_file("board.html"), "three.js": three_script()}
+    texts = {name: page_file(name) for name in ("stage.js", "page.css")}
+    texts |= {name: own_file(name) for name in ("dumbbells.js", "board.js")}
+    texts |= {"": own_file("board.html"), "three.js": three_script()}
     return _application(texts, POLICY, host, [("/live", _Live, {"pair": pair})])
 
 

@@ -7,11 +7,11 @@ The *gap* of a vertex is its greatest height over the faces of the other part: n
 outside a bound of the distance that vanishes with it.  That of two edges is the distance of the
 points where they cross, seen along the normal of the plane between the parts, or by how much they
 miss each other there, if that is more.  So gaps are continuous as long as the plane is the same,
-and none is small where nothing touches.  What is beside a face, or misses an edge, by no more than
-is a plane through both, counts as over it: where corners lie on corners, as in a stack, load does
-not pass from one to the other with every shift by a rounding error.  All close and slip along the one plane between the parts
-(:mod:`~polycorner.motion.hulls.planes`), at the point of the vertex or edge.  Where parts overlap
-the contact of the plane itself, a face and the vertex that is deepest or two edges, has the height
+and none is small where nothing touches.  What is beside a face, or misses an edge, by no more than a
+rounding error counts as over it: where corners lie on corners, as in a stack, load does not pass
+from one to the other with every shift by such an error.  All close and slip along the one plane
+between the parts (:mod:`~polycorner.motion.hulls.planes`), at the point of the vertex or edge.
+Where parts overlap the contact of the plane itself, a face and the vertex that is deepest or two edges, has the height
 of the plane, so that no overlap is without a contact.
 
 Rows: in the plane, velocities that keep both ends of the overlap of two parallel faces from closing

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.colors import to_rgba
 from numpy.typing import ArrayLike
 
 from polycorner.atomic import replace_atomically
@@ -361,3 +362,27 @@ def _unbroken(line: Array) -> list[Array]:
     pieces = np.split(line, gaps)
     whole = [piece[~np.isnan(piece).any(axis=1)] for piece in pieces]
     return [piece for piece in whole if len(piece) > 1]
+
+
+def painted(
+    mesh: Any, colour: str, *, opacity: float = 1.0, rough: float = 0.55, two_sided: bool = False
+) -> "trimesh.Trimesh":
+    """Give a mesh a material of one colour, not metallic, since there is nothing to reflect."""
+    import trimesh
+
+    made: Any = trimesh.visual
+    material = made.material.PBRMaterial(
+        baseColorFactor=[*map(_linear, to_rgba(colour)[:3]), round(255 * opacity)],
+        metallicFactor=0.0,
+        roughnessFactor=rough,
+        doubleSided=two_sided or opacity < 1,
+        alphaMode="BLEND" if opacity < 1 else "OPAQUE",
+    )
+    mesh.visual = made.TextureVisuals(material=material)
+    found: trimesh.Trimesh = mesh
+    return found
+
+
+def _linear(part: float) -> int:
+    """Return a component of an sRGB colour as linear light from 0 to 255, as in GLB files."""
+    return round(255 * (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4))

@@ -15,6 +15,7 @@ from polycorner.dumbbells import DumbbellDrum, DumbbellPair
 from polycorner.dumbbells.pictures import bodies as scene_bodies
 from polycorner.dumbbells.pictures import scenes
 from polycorner.dumbbells.pictures.placements import forbidden_solid
+from polycorner.pictures.solids.meshes import painted
 
 PLANE, DRUM = DumbbellPair(16, 3, 1.5), DumbbellPair(16, 3, 1.5, 125)
 PAIRS = st.sampled_from([PLANE, DRUM, DumbbellPair(9, 2, 1.2, 15)])
@@ -177,7 +178,7 @@ def test_the_solid_alone_is_the_same_one():
 
 def test_colours_of_a_file_are_linear_light(tmp_path):
     """Half of full sRGB is 21.4 per cent of the light."""
-    painted = scenes._painted(trimesh.creation.box(), "#808080")
-    assert painted.visual.material.baseColorFactor[:3].tolist() == [55, 55, 55]
-    path = scenes.write_scene(trimesh.Scene(painted), tmp_path / "new" / "box.glb")
+    made = painted(trimesh.creation.box(), "#808080")
+    assert made.visual.material.baseColorFactor[:3].tolist() == [55, 55, 55]
+    path = scenes.write_scene(trimesh.Scene(made), tmp_path / "new" / "box.glb")
     assert path.read_bytes()[:4] == b"glTF"

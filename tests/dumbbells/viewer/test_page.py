@@ -20,9 +20,10 @@ from polycorner.dumbbells.pictures.film import (
     pair_film,
     stratum_words,
 )
-from polycorner.dumbbells.viewer.page import atlas_page, film_page, three_script, write_page
+from polycorner.dumbbells.viewer.page import atlas_page, film_page, write_page
 from polycorner.dumbbells.viewer.steepest_descent import descent
 from polycorner.errors import PolycornerError
+from polycorner.pictures.pages import three_script
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
 BEGIN = DRUM.nested("R", heading=0.5, clearance=1.5) + np.array([0.08, 0, 0, 0.06, 0, -0.1])
@@ -44,7 +45,7 @@ def test_a_page_carries_its_numbers_and_forbids_everything_else(way):
     film = replace(pair_film(DRUM, way.points), title="A < B & </script>", note='"x"')
     page = film_page(film)
     blocks = re.findall(r"<script([^>]*)>(.*?)</script>", page, re.DOTALL)
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page).group(1)
     assert policy.startswith("default-src 'none'; script-src 'sha256-")
     for attributes, text in blocks:

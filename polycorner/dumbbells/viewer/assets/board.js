@@ -10,7 +10,7 @@ class Board {
   constructor() {
     this.pending = {}; // values moved and not yet sent
     this.fields = {};
-    this.stage = new Stage($("stage"));
+    this.stage = new DumbbellStage($("stage"));
     this.atlas = new Stage($("atlas"));
     this.socket = new WebSocket(`ws://${location.host}/live`);
     this.socket.binaryType = "arraybuffer";

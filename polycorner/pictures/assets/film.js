@@ -1,9 +1,10 @@
 "use strict";
 
-// Plays the film that the page carries: numbers packed by page.py, unpacked here.
+// Plays the film that the page carries: numbers packed in Python, unpacked here.
 
 const $ = (id) => document.getElementById(id);
 const WHOLE = 20; // seconds in which a film plays at speed 1
+const MOST = 24; // contacts that are named
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10];
 
 // Text in base64 of a gzip file, to its bytes.
@@ -13,15 +14,16 @@ async function unpacked(text) {
   return new Response(stream).arrayBuffer();
 }
 
-const numbers = async (text) => new Float32Array(await unpacked(text));
+const floats = async (text) => new Float32Array(await unpacked(text));
 const counts = async (text) => new Uint32Array(await unpacked(text));
 
 async function decoded(data) {
-  const film = { ...data, times: await numbers(data.times), centres: await numbers(data.centres) };
-  film.roles = new Uint8Array(await unpacked(data.roles));
+  const film = { ...data, times: await floats(data.times), centres: await floats(data.centres) };
+  if (data.roles) film.roles = new Uint8Array(await unpacked(data.roles));
+  if (data.turns) film.turns = await floats(data.turns);
   film.energies = await Promise.all(data.energies.map(async ([name, text]) => [name, new Float64Array(await unpacked(text))]));
   film.word = await counts(data.word);
-  film.places = await numbers(data.contacts.places);
+  film.places = await floats(data.contacts.places);
   film.which = await counts(data.contacts.which);
   film.first = await counts(data.contacts.first); // contacts of frame k: first[k] to first[k + 1]
   return film;
@@ -45,24 +47,29 @@ function chips(value, names) {
 }
 
 class Player {
-  constructor(film) {
+  constructor(film, stage) {
     this.film = film;
-    this.stage = new Stage($("stage"));
-    this.stage.wall(film.wall);
+    this.stage = stage;
     this.at = -1;
-    const labels = ["Contacts", "Stratum", "Chirality", ...film.energies.map(([name]) => name)];
-    [this.contacts, this.stratum, this.hand, ...this.energies] = rows(labels);
+    const labels = ["Contacts", ...film.labels, ...film.energies.map(([name]) => name)];
+    const values = rows(labels);
+    this.contacts = values[0];
+    this.words = values.slice(1, 1 + film.labels.length);
+    this.energies = values.slice(1 + film.labels.length);
     this.contacts.id = "contacts";
-    this.stratum.id = "stratum";
-    this.hand.id = "chirality";
-    const unknown = { contacts: !film.contacts.names.length, stratum: film.words.every(([face]) => !face) };
-    for (const row of Object.keys(unknown).filter((name) => unknown[name])) {
-      this[row].hidden = this[row].previousSibling.hidden = true; // not recorded
-    }
+    this.hide(this.contacts, !film.contacts.names.length);
+    this.words.forEach((value, k) => {
+      value.id = film.labels[k].toLowerCase();
+      this.hide(value, film.words.every((words) => !words[k])); // not recorded
+    });
     this.energies.forEach((value, k) => { value.id = `energy-${k}`; });
     this.controls();
     this.look();
     this.show(0);
+  }
+
+  hide(value, unknown) {
+    value.hidden = value.previousSibling.hidden = unknown;
   }
 
   controls() {
@@ -75,7 +82,8 @@ class Player {
     $("on").addEventListener("click", () => this.step(1));
     $("reset").addEventListener("click", () => this.look());
     $("follow").addEventListener("change", () => this.follow());
-    const natural = (times[last] - times[0]) / WHOLE;
+    // A speed that is asked for stands among factors of it, the whole film in WHOLE seconds else.
+    const natural = this.film.speed ?? (times[last] - times[0]) / WHOLE;
     for (const speed of SPEEDS) {
       const real = this.film.unit === "s" ? ` (${Number((speed * natural).toPrecision(2))} × real time)` : "";
       $("speed").append(new Option(`${speed}×${real}`, speed, speed === 1, speed === 1));
@@ -101,13 +109,14 @@ class Player {
   look() {
     const { low, high } = this.film.box;
     const middle = low.map((value, k) => (value + high[k]) / 2);
-    this.stage.frame(middle, Math.max(0.58 * Math.hypot(...low.map((value, k) => high[k] - value)), 1));
+    const across = 0.58 * Math.hypot(...low.map((value, k) => high[k] - value));
+    this.stage.frame(middle, this.film.radius ?? Math.max(across, 1), this.film.from, this.film.up);
   }
 
-  // Keep the dumbbells in the middle of the picture.
+  // Keep the bodies in the middle of the picture.
   follow() {
     if (!$("follow").checked) { this.middle = null; return; }
-    const { film } = this, wide = 6 * film.count, sum = [0, 0, 0];
+    const { film } = this, wide = film.centres.length / film.times.length, sum = [0, 0, 0];
     let found = 0;
     film.centres.subarray(this.at * wide, (this.at + 1) * wide).forEach((value, k) => {
       if (Number.isNaN(value)) return;
@@ -152,20 +161,17 @@ class Player {
   show(k) {
     if (k === this.at) return;
     this.at = k;
-    const { film } = this, wide = 6 * film.count;
-    this.stage.dumbbells(film.sizes, film.centres.subarray(k * wide, (k + 1) * wide),
-      film.roles.subarray(k * film.count, (k + 1) * film.count));
+    const { film } = this;
+    this.stage.place(film, k);
     this.follow();
     const [from, to] = [film.first[k], film.first[k + 1]];
     const touching = Array.from({ length: to - from }, (_, j) => from + j);
-    this.stage.contacts(touching.map((j) => [...film.places.subarray(3 * j, 3 * j + 3)]), film.sizes.ball);
-    this.stage.turn(film.spin * film.times[k]);
-    chips(this.contacts, touching.map((j) => film.contacts.names[film.which[j]]));
-    const [face, hand] = film.words[film.word[k]];
-    this.stratum.textContent = face || "not computed";
-    this.hand.textContent = hand;
+    this.stage.contacts(touching.map((j) => [...film.places.subarray(3 * j, 3 * j + 3)]), film.mark);
+    const names = [...new Set(touching.map((j) => film.contacts.names[film.which[j]]))];
+    chips(this.contacts, names.length > MOST ? [`${touching.length} contacts`] : names);
+    this.words.forEach((value, j) => { value.textContent = film.words[film.word[k]][j] || "not computed"; });
     film.energies.forEach(([, values], j) => { this.energies[j].textContent = values[k].toPrecision(7); });
-    const time = `${film.times[k].toFixed(film.unit === "s" ? 2 : 3)} ${film.unit}`;
+    const time = film.unit === "" ? `${film.times[k]}` : `${film.times[k].toFixed(film.unit === "s" ? 2 : 3)} ${film.unit}`;
     $("clock").textContent = time;
     $("when").value = k;
     $("when").setAttribute("aria-valuetext", time);
@@ -193,10 +199,17 @@ async function showModel(data) {
   });
 }
 
+// What draws a film: bodies, or the stage of an application.
+const STAGES = { bodies: Stage, ...(typeof DumbbellStage === "undefined" ? {} : { dumbbells: DumbbellStage }) };
+
 async function begin() {
   const data = JSON.parse($("film").textContent);
   if (data.model) await showModel(data);
-  else window.player = new Player(await decoded(data));
+  else {
+    const film = await decoded(data), stage = new STAGES[data.stage ?? "bodies"]($("stage"));
+    await stage.build(film);
+    window.player = new Player(film, stage);
+  }
   document.documentElement.dataset.ready = "yes";
 }
 

@@ -1,8 +1,7 @@
 "use strict";
 
-// Dumbbells, the wall and contacts, drawn with three.js (the global THREE).  One Stage is one
-// picture, on pages of films and on the live page.
-// Lengths are mm, coordinates those of the library: y along the drum, z up.
+// Bodies and contacts, drawn with three.js (the global THREE).  One Stage is one picture, on pages
+// of films and on pages of applications.  Coordinates are those of the library.
 
 class Stage {
   // host: the element to fill.  Without WebGL it shows a message, and all methods do nothing.
@@ -11,7 +10,6 @@ class Stage {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 1, 4000);
     this.radius = 30;
-    this.phase = 0; // angle (rad) by which the lines along the drum have turned
     this.scene.add(this.camera);
     this.scene.add(new THREE.AmbientLight(0xffffff, 0.5));
     const lamp = new THREE.DirectionalLight(0xffffff, 0.6);
@@ -68,7 +66,7 @@ class Stage {
 
   // ------------------------------------------------------------------------------------- the view
 
-  // Look at a ball of some radius (mm) about a point, from a direction and with a direction that
+  // Look at a ball of some radius about a point, from a direction and with a direction that
   // points up the page; remembered for the button that resets the view.
   frame(centre, radius, from = [0, -0.55, 1], up = [0, 1, 0]) {
     Object.assign(this, { centre, radius, from, up });
@@ -90,7 +88,7 @@ class Stage {
     this.ask();
   }
 
-  // Move the camera and its target by a vector in mm.
+  // Move the camera and its target by a vector.
   shift(by) {
     if (!this.renderer) return;
     for (const place of [this.camera.position, this.controls.target]) place.add(new THREE.Vector3(...by));
@@ -158,44 +156,67 @@ class Stage {
     return this.put(name, mesh);
   }
 
-  // sizes: {length, ball, rod} in mm.  centres: six numbers a dumbbell; NaN: not there.
-  // roles: what each is coloured as, see the style sheet's --role-0 and following.
-  dumbbells(sizes, centres, roles) {
-    this.last.dumbbells = [sizes, centres, roles];
+  // ---------------------------------------------------------------------------------- films of bodies
+
+  // Prepare a film of motion_pages.py: kinds with triangles, what stands still, and outlines.
+  async build(film) {
+    this.flat = film.flat;
+    for (const [k, kind] of film.kinds.entries()) kind.meshes = await this.meshes(kind);
+    for (const [k, thing] of film.still.entries()) {
+      for (const mesh of await this.meshes({ ...thing, most: 1 })) this.put(`still ${k} ${mesh.name}`, mesh);
+    }
+    for (const [k, line] of film.lines.entries()) this.lines(`line ${k}`, [...(await floats(line))]);
+    if (!this.works || !film.flat) return;
+    this.controls.noRotate = true; // the plane is seen from above; dragging moves it
+    this.controls.mouseButtons = { LEFT: THREE.MOUSE.PAN, MIDDLE: THREE.MOUSE.DOLLY, RIGHT: THREE.MOUSE.PAN };
+    this.controls.staticMoving = true;
+    this.renderer.clippingPlanes = film.clip.map(([x, y, c]) => new THREE.Plane(new THREE.Vector3(x, y, 0), c));
+  }
+
+  // The layers of a kind, each drawn once for every body.
+  async meshes({ layers, most }) {
+    if (!this.works) return [];
+    const made = [];
+    for (const { colour, vertices, faces, normals } of layers) {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.BufferAttribute(await floats(vertices), 3));
+      geometry.setAttribute("normal", new THREE.BufferAttribute(await floats(normals), 3));
+      geometry.setIndex(new THREE.BufferAttribute(await counts(faces), 1));
+      const paint = { color: new THREE.Color(colour).convertSRGBToLinear() };
+      const material = this.flat ? new THREE.MeshBasicMaterial({ ...paint, side: THREE.DoubleSide })
+        : new THREE.MeshStandardMaterial({ ...paint, roughness: 0.5, metalness: 0 });
+      const mesh = new THREE.InstancedMesh(geometry, material, most);
+      mesh.frustumCulled = false; // its box does not follow the instances
+      mesh.name = `layer ${made.length}`;
+      if (most === 1) mesh.setMatrixAt(0, new THREE.Matrix4());
+      this.scene.add(mesh);
+      made.push(mesh);
+    }
+    return made;
+  }
+
+  // Show the bodies of a film at an instant, with their images.
+  place(film, k) {
     if (!this.works) return;
-    const count = roles.length, key = JSON.stringify([sizes, count]);
-    if (this.built !== key) {
-      const plain = () => new THREE.MeshStandardMaterial({ roughness: 0.5, metalness: 0 });
-      this.balls = this.swarm("balls", new THREE.SphereGeometry(sizes.ball, 40, 26), plain(), 2 * count);
-      this.rods = this.swarm("rods", new THREE.CylinderGeometry(sizes.rod, sizes.rod, 1, 32), plain(), count);
-      this.built = key;
-    }
-    const tones = [0, 1, 2, 3, 4].map((k) => this.colour(`role-${k}`));
-    const place = new THREE.Object3D(), up = new THREE.Vector3(0, 1, 0);
-    for (let k = 0; k < count; k++) {
-      const [one, two] = [0, 3].map((at) => new THREE.Vector3().fromArray(centres, 6 * k + at));
-      const here = Number.isNaN(one.x) ? 0 : 1; // those that left shrink to nothing
-      const axis = two.clone().sub(one), long = here ? axis.length() : 1;
-      place.quaternion.identity();
-      for (const [side, ball] of [one, two].entries()) {
-        place.position.copy(here ? ball : up);
-        place.scale.setScalar(here);
-        place.updateMatrix();
-        this.balls.setMatrixAt(2 * k + side, place.matrix);
-        this.balls.setColorAt(2 * k + side, tones[roles[k]]);
+    const matrix = new THREE.Matrix4(), spot = new THREE.Vector3(), turn = new THREE.Quaternion(), one = new THREE.Vector3(1, 1, 1);
+    let body = k * film.count;
+    for (const kind of film.kinds) {
+      let seen = 0;
+      for (let j = 0; j < kind.count; j++, body++) {
+        if (Number.isNaN(film.centres[3 * body])) continue; // it has left
+        turn.fromArray(film.turns, 4 * body);
+        for (const shift of film.shifts) {
+          spot.fromArray(film.centres, 3 * body).add(new THREE.Vector3(...shift));
+          if (film.shifts.length > 1 && [0, 1].some((a) => spot.getComponent(a) < film.box.low[a] - kind.size || spot.getComponent(a) > film.box.high[a] + kind.size)) continue;
+          matrix.compose(spot, turn, one);
+          for (const mesh of kind.meshes) mesh.setMatrixAt(seen, matrix);
+          seen += 1;
+        }
       }
-      if (here) {
-        place.position.copy(one).addScaledVector(axis, 0.5);
-        place.quaternion.setFromUnitVectors(up, axis.divideScalar(long));
+      for (const mesh of kind.meshes) {
+        mesh.count = seen;
+        mesh.instanceMatrix.needsUpdate = true;
       }
-      place.scale.set(here, here * long, here);
-      place.updateMatrix();
-      this.rods.setMatrixAt(k, place.matrix);
-      this.rods.setColorAt(k, tones[roles[k]]);
-    }
-    for (const mesh of [this.balls, this.rods]) {
-      mesh.instanceMatrix.needsUpdate = true;
-      mesh.instanceColor.needsUpdate = true;
     }
     this.ask();
   }
@@ -223,56 +244,13 @@ class Stage {
     }
   }
 
-  // wall: {radius (null: flat), depth, across: [least, greatest], along: [least, greatest]}.
-  wall(wall, spacing = 10) {
-    const key = JSON.stringify([wall, spacing, this.style("wall")]);
-    if (!this.works || key === this.walled) return;
-    this.walled = key;
-    this.last.wall = [wall, spacing];
-    const at = (u, y, lift = 0) => wall.radius === null ? [u, y, lift - wall.depth]
-      : [(wall.radius - lift) * Math.sin(u), y, (lift - wall.radius) * Math.cos(u)];
-    const steps = wall.radius === null ? 1 : 48;
-    const spread = ([low, high], n) => Array.from({ length: n + 1 }, (_, k) => low + ((high - low) * k) / n);
-    const places = spread(wall.across, steps), corners = [], faces = [];
-    places.forEach((u, k) => {
-      corners.push(...at(u, wall.along[0]), ...at(u, wall.along[1]));
-      if (k) faces.push(2 * k - 2, 2 * k, 2 * k - 1, 2 * k - 1, 2 * k, 2 * k + 1);
-    });
-    const geometry = new THREE.BufferGeometry().setIndex(faces);
-    geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
-    geometry.computeVertexNormals();
-    const paint = { color: this.colour("wall"), roughness: 1, side: THREE.DoubleSide };
-    this.put("wall", new THREE.Mesh(geometry, new THREE.MeshStandardMaterial(paint)));
-    // Lines every 10 mm: along the drum they turn with it, around it they stay.
-    this.pitch = wall.radius === null ? spacing : spacing / wall.radius;
-    // Multiples of a unit, shifted by a phase, in a closed interval.
-    const multiples = ([low, high], unit, phase = 0) => {
-      const first = Math.ceil((low - phase) / unit), last = Math.floor((high - phase) / unit);
-      return Array.from({ length: Math.max(0, last - first + 1) }, (_, k) => (first + k) * unit + phase);
-    };
-    const lift = 0.02;
-    this.meridians = () => this.lines("meridians", multiples(wall.across, this.pitch, this.phase)
-      .flatMap((u) => [...at(u, wall.along[0], lift), ...at(u, wall.along[1], lift)]));
-    this.meridians();
-    this.lines("parallels", multiples(wall.along, spacing).flatMap((y) =>
-      places.slice(1).flatMap((u, k) => [...at(places[k], y, lift), ...at(u, y, lift)])));
-    this.axes(["x", wall.radius === null ? "y" : "η", "z"], at(wall.across[0], wall.along[0], lift), 10);
-  }
-
-  // Turn the drum by an angle (rad); only the lines show it, so whole spacings do not count.
-  turn(angle) {
-    if (!this.meridians || angle % this.pitch === this.phase) return;
-    this.phase = angle % this.pitch;
-    this.meridians();
-  }
-
   lines(name, numbers) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(numbers, 3));
     this.put(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: this.colour("grid") })));
   }
 
-  // Three arrows of a length (mm) from a point, with their names at the ends.
+  // Three arrows of a length from a point, with their names at the ends.
   axes(names, origin, length) {
     this.last.axes = [names, origin, length];
     if (!this.works) return;
