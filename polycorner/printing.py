@@ -7,12 +7,16 @@ fonts or scripts of its own, so that it follows the theme of the page that shows
 import math
 import textwrap
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from html import escape
 from itertools import islice, zip_longest
+from typing import Any
+
+import numpy as np
 
 WIDTH = 96  # columns at which sentences are wrapped unless a width is given
 GAP = 2  # columns between two columns of a table
+FEW_NUMBERS = 6  # up to which an array is shown
 MOST_ROWS = 20  # rows that are shown of a long table
 
 
@@ -210,6 +214,44 @@ def names(words: Iterable[str], most: int = 60) -> str:
     every = list(words)
     row = ", ".join(every)
     return row if len(row) <= most else f"{len(every)} functions"
+
+
+def few(words: Iterable[str], most: int = 60) -> str:
+    """Return names separated by commas, the middle ones left out where they would be too many.
+
+    >>> few("abcdefgh", 12)
+    'a, b, ..., h'
+    """
+    every = list(words)
+    first = every
+    while len(first) > 1 and len(", ".join(first)) > most:
+        first = first[: (len(first) + 1) // 2]
+    while len(every) > len(first) > 1 and len(", ".join([*first, "...", every[-1]])) > most:
+        first = first[:-1]
+    return ", ".join(every if len(first) == len(every) else [*first, "...", every[-1]])
+
+
+def brief(value: Any, most: int = 60) -> str:
+    """Return a value in one line, of long ones the beginning, and of large arrays the shape.
+
+    >>> brief(np.zeros((30, 2))), brief(3.0)
+    ('30 x 2 numbers', '3.0')
+    """
+    if isinstance(value, np.ndarray) and value.size > FEW_NUMBERS:
+        return f"{' x '.join(map(str, value.shape))} numbers"
+    if isinstance(value, tuple | list) and len(repr(value)) > most:
+        return f"{len(value)} values"
+    text = " ".join(str(value).split())
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+class Described(Printed):
+    """Base of dataclasses that are shown by their fields."""
+
+    def _sheet(self) -> Sheet:
+        made: Any = self
+        rows = ((f.name, brief(getattr(self, f.name))) for f in fields(made) if f.repr)
+        return Sheet(type(self).__name__, (facts(rows),))
 
 
 def angle_unit(period: float) -> str:

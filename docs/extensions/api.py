@@ -114,7 +114,7 @@ GROUPS = (
         "Rigid bodies in the plane and in space, walls, and sets of placements without overlap.",
         {
             "bodies": "Arrangement Body Part disc sphere capsule polygon polytope compound "
-            "HalfSpace Cylinder box Mass mass_of scaled thinned",
+            "HalfSpace Cylinder box Mass mass_of scaled thinned Robot RobotLink RobotJoint",
         },
     ),
     Group(
@@ -133,7 +133,8 @@ GROUPS = (
         {
             "": "System State simulate Trajectory",
             "motion": "Assembly MotionOfKind step Event EventKind Checkpoint Solver MotionOptions "
-            "MechanicalSystem Accelerations Consistency accelerations",
+            "MechanicalSystem Accelerations Consistency accelerations ContactForce ContactForces "
+            "contact_forces",
         },
     ),
     Group(

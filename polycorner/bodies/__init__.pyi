@@ -1,7 +1,9 @@
 from .arrangement import Arrangement
 from .drives import Damper, Motor, Prescribed, Spring
 from .joints import Ball, Fixed, Gear, Hinge, Joint, Planar, Rail, Slider
+from .links import RobotJoint, RobotLink
 from .masses import Mass, mass_of
+from .robots import Robot
 from .shapes import Body, Part, capsule, compound, disc, polygon, polytope, sphere
 from .sizes import scaled, thinned
 from .walls import Cylinder, HalfSpace, box
@@ -23,6 +25,9 @@ __all__ = [
     "Planar",
     "Prescribed",
     "Rail",
+    "Robot",
+    "RobotJoint",
+    "RobotLink",
     "Slider",
     "Spring",
     "box",

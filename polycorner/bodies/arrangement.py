@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
+from itertools import chain
 from operator import mul
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,6 +20,7 @@ from polycorner.bodies.dynamics import (
     friction_of,
     masses_of,
     smooth,
+    twins,
 )
 from polycorner.bodies.joints import WORLD, AnyJoint
 from polycorner.bodies.kernels import together
@@ -27,11 +29,12 @@ from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.mechanisms import Mechanism, check_joints, closed, completed, moved_along
 from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
-from polycorner.bodies.pairs import PlacedPart, Tree, apart, distances, members
+from polycorner.bodies.pairs import Tree, apart, distances, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
+from polycorner.bodies.scenes import BodiesInSpace
 from polycorner.bodies.several import assembly
 from polycorner.bodies.shapes import Body
-from polycorner.bodies.walls import Wall, within
+from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.assembly import Assembly
@@ -39,6 +42,7 @@ from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.printing import Printed, Sheet, few, listed
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
@@ -90,7 +94,7 @@ def angular(argument: str, given: Any, d: int) -> float | Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Arrangement(Checked):
+class Arrangement(Checked, Printed):
     """Rigid bodies that must not overlap each other, fixed bodies, or walls.
 
     The coordinates of a body ``A`` are those of its origin, ``xA yA`` or ``xA yA zA``, and of its
@@ -195,6 +199,28 @@ class Arrangement(Checked):
         object.__setattr__(self, "turning", angular("turning", self.turning, self.dimension))
         super().__post_init__()
 
+    def __repr__(self) -> str:
+        """Return the names of the bodies and of what is around them."""
+        around = {"walls": self.walls, "fixed": self.fixed}
+        told = [f"bodies {few(self.named)}"]
+        told += [f"{what} {few(some)}" for what, some in around.items() if some]
+        told += [f"period {self.period}"] * (self.period is not None)
+        return f"Arrangement({'; '.join(told)})"
+
+    def _sheet(self) -> Sheet:
+        moving = (
+            (p.name, p.body.described, few(p.manifold.names), "moves") for p in self.placements
+        )
+        still = ((name, body.described, "", "fixed") for name, body in self.fixed.items())
+        walls = ((name, wall.described, "", "wall") for name, wall in self.walls.items())
+        count = len(self.named) + len(self.fixed) + len(self.walls)
+        head = ("name", "shape", "coordinates", "")
+        period = f"Periodic with lengths {self.period}." if self.period is not None else ""
+        turns = f"Axes turn at {self.turning} rad/s." if np.any(self.turning) else ""
+        title = f"Arrangement in {'the plane' if self.dimension == 2 else 'space'}"
+        rows = chain(moving, still, walls)
+        return Sheet(title, (listed("", head, rows, count), period, turns))
+
     @property
     def named(self) -> dict[str, Body]:
         """The bodies that move, by name."""
@@ -259,7 +285,7 @@ class Arrangement(Checked):
         unions that are never active.
         """
         found = [apart(self.manifold, *pair, excluded=excluded) for pair in self.pairs]
-        found += [function for _, function, *_ in self.at_walls]
+        found += [touch.gap for touch in self.at_walls]
         if not (found or self.joints):
             refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
         return together(found)
@@ -272,14 +298,14 @@ class Arrangement(Checked):
         return [pair for pair in found if frozenset(m.body for m in pair) not in joined]
 
     @cached_property
-    def at_walls(self) -> list[tuple[Wall, SmoothFunction, PlacedPart, Array, str]]:
-        """The gaps at walls with parts, their points, and the names of the walls."""
+    def at_walls(self) -> list[WallTouch]:
+        """The gaps at walls."""
         return [
-            (wall, function, member, point, name)
+            touch
             for name, wall in self.walls.items()
             for p in self.placements
             for member in members(p.name, p.body, p)
-            for function, point in within(self.manifold, name, wall, member)
+            for touch in within(self.manifold, name, wall, member)
         ]
 
     def system(  # noqa: PLR0913 - all are options
@@ -375,12 +401,12 @@ class Arrangement(Checked):
         of_joints = self.mechanism, self.manifold, holders
         laws, moved = driven(*of_joints, laws, drives, forces, rubbing_joints)
         touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
-        walls = [(f.name, wall, member, point) for wall, f, member, point, _ in self.at_walls]
         meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
-        meetings += [Meeting(f.name, member.body, on) for _, f, member, _, on in self.at_walls]
+        meetings += [Meeting(t.gap.name, t.member.body, t.name) for t in self.at_walls]
         meetings += [Meeting(end, *[end.rpartition(".")[0]] * 2) for end in self.mechanism.limits]
         family, first = None, self.placements[0]
-        meetings += [Meeting(f"{first.name}-{first.name}", *[first.name] * 2, True)] * (count > 1)
+        if count > 1:
+            meetings.append(Meeting(f"{first.name}-{first.name}", first.name, first.name, True))
         known = laws_of(friction, rolling, restitution, meetings, self.named)
         if count > 1:
             check_width(self.lattice, [first.body], [*self.fixed.values()])
@@ -393,11 +419,20 @@ class Arrangement(Checked):
         return System(
             placed,
             *laws,
-            friction_of(self.manifold, touches, walls, known.friction, known.rolling) + moved,
+            friction_of(self.manifold, touches, self.at_walls, known.friction, known.rolling)
+            + moved,
             restitution={f.name: known.restitution.get(f.name, 0.0) for f in placed.functions},
             count=count,
             between=family,
             exits={} if exits is None else exits,
+            scene=BodiesInSpace(
+                self.placements,
+                tuple(touches),
+                tuple(self.at_walls),
+                frozenset(self.walls),
+                count,
+                partial(twins, (first, first), self.lattice),
+            ),
         )
 
     def _alone(self, p: Placement) -> "Arrangement":

@@ -20,7 +20,8 @@ from polycorner.bodies.pairs import PlacedPart, Touch, distances, members
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import carried, turned
 from polycorner.bodies.shapes import Part
-from polycorner.bodies.slips import ROLLING, SLIDING, AtWall, slips_at_wall, slips_of
+from polycorner.bodies.slips import ROLLING, SLIDING, slips_at_wall, slips_of
+from polycorner.bodies.walls import WallTouch
 from polycorner.checks import refuse
 from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.functions import SmoothFunction
@@ -208,18 +209,18 @@ def _rotation(p: Placement, mass: Mass, rates: "tuple[sympy.Symbol, ...]") -> "s
 def friction_of(
     manifold: Manifold,
     touches: list[Touch],
-    walls: list[AtWall],
+    walls: list[WallTouch],
     sliding: Mapping[str, Both],
     rolls: Mapping[str, Both],
 ) -> tuple[Friction, ...]:
     """Return dry friction and rolling resistance where a coefficient is positive."""
     space = motions(manifold)
     rubbing: dict[str, list[PlacedPart]] = {t.gap.name: [t.one, t.two] for t in touches}
-    rubbing |= {label: [member] for label, _, member, _ in walls}
+    rubbing |= {t.gap.name: [t.member] for t in walls}
     slips: dict[str, Callable[[str], tuple[SmoothFunction, ...]]] = {
         t.gap.name: partial(slips_of, space, t) for t in touches
     }
-    slips |= {touch[0]: partial(slips_at_wall, space, touch) for touch in walls}
+    slips |= {t.gap.name: partial(slips_at_wall, space, t) for t in walls}
     laws: list[Callable[..., Friction]] = []
     rows: list[tuple[SmoothFunction, ...]] = []
     for argument, by_name, kind, verb in (
@@ -254,6 +255,17 @@ def _check_turning(argument: str, rubbing: list[PlacedPart], given: Any) -> None
             refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
+def twins(
+    placements: tuple[Placement, Placement], lattice: Lattice
+) -> tuple[tuple[Placement, ...], list[Touch]]:
+    """Return two bodies like given ones, called after these with 1 and 2, and their contacts."""
+    named = [(p, f"{p.name}{k}") for p, k in zip(placements, PAIR, strict=True)]
+    pair = tuple(replace(p, name=name, manifold=_renamed(p, name)) for p, name in named)
+    space = pair[0].manifold * pair[1].manifold
+    meeting = pairs(lattice, pair, {})
+    return pair, [t for parts in meeting for t in distances(space, *parts)]
+
+
 def between(
     placements: tuple[Placement, Placement], lattice: Lattice, known: Laws
 ) -> ContactFamily | HullContacts:
@@ -264,13 +276,9 @@ def between(
     """
     if all(is_sharp(part) for p in placements for part in p.body.parts.values()):
         return between_hulls(placements, lattice, known)
-    named = [(p, f"{p.name}{k}") for p, k in zip(placements, PAIR, strict=True)]
-    pair = [replace(p, name=name, manifold=_renamed(p, name)) for p, name in named]
-    space = pair[0].manifold * pair[1].manifold
-    meeting = pairs(lattice, tuple(pair), {})
-    touches = [t for parts in meeting for t in distances(space, *parts)]
+    pair, touches = twins(placements, lattice)
     definitions, gaps = written_out({t.gap.name: t.gap for t in touches})
-    both, laws = motions(space), []
+    both, laws = motions(pair[0].manifold * pair[1].manifold), []
     name = "-".join(p.name for p in placements)
     for argument, given, kind, cause in (
         ("friction", known.friction, SLIDING, RUBBING),
@@ -279,7 +287,7 @@ def between(
         static, dynamic = given.get(name, NONE)
         if static == 0:
             continue
-        _check_turning(argument, [*meeting[0]], static)
+        _check_turning(argument, [touches[0].one, touches[0].two], static)
         d = pair[0].body.dimension
         sets = _set(static, d), _set(dynamic, d)
         slips = {t.gap.name: slips_of(both, t, kind) for t in touches}
@@ -338,12 +346,9 @@ def _hull(body: str, name: str, part: Part) -> Hull:
     """Return a sharp part with the numbers that the compiled code needs."""
     facets, label = part.facets, f"{body}.{name}" if name else body
     if len(part.points) > MOST_VERTICES:
-        refuse(
-            "bodies",
-            f"at most {MOST_VERTICES} vertices of a sharp part that moves, since its "
-            f"contacts are as many as pairs of edges",
-            f"{len(part.points)} of {label!r}",
-        )
+        why = "since contacts are as many as pairs of edges"
+        expected = f"at most {MOST_VERTICES} vertices of {label!r}, {why}"
+        refuse("bodies", expected, len(part.points))
     on = np.array([face[0] for face in facets.faces])
     return Hull(label, part.points, facets.normals, on, facets.edges)
 

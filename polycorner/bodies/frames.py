@@ -8,6 +8,7 @@ frame          coordinates                 for
 ``turned``     ``x y theta``               bodies in the plane
 ``axial``      ``x y z``, a unit vector    bodies of revolution: the direction of their axis
 ``rotated``    ``x y z``, a quaternion     bodies in space
+``linked``     those of joints             links of chains: ``x y z``, a matrix (:mod:`chains`)
 =============  ==========================  ====================================================
 
 A point in coordinates of the body is carried to ``c + R p``; of bodies of revolution only the
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from polycorner.spaces.distances import Point
 
 AXES = "xyz"
+POSE = (*AXES, *(f"r{i}{j}" for i in range(3) for j in range(3)))  # origin and matrix of a link
 
 
 class Frame(Enum):
@@ -39,6 +41,7 @@ class Frame(Enum):
     TURNED = "turned"
     AXIAL = "axial"
     ROTATED = "rotated"
+    LINKED = "linked"
 
     @property
     def turns(self) -> bool:
@@ -74,6 +77,8 @@ class Frame(Enum):
         """Return the names of the coordinates of a body called ``name``."""
         if self is Frame.FIXED:
             return ()
+        if self is Frame.LINKED:
+            return tuple(f"{entry}{name}" for entry in POSE)
         return self.manifold(name, dimension, 1.0, 1.0, "").names
 
     def local(self, vector: Sequence[float], axis: Array | None) -> tuple[float, ...]:
@@ -107,7 +112,7 @@ class Frame(Enum):
             return _triple([cosine * x - sine * y, sine * x + cosine * y])
         if self is Frame.AXIAL:
             return _triple([local[0] * u for u in turns])
-        return _triple(list(rotation_matrix(turns) * sympy.Matrix(local)))
+        return _triple(list(self._matrix(turns) * sympy.Matrix(local)))
 
     def into(self, name: str, point: "Point", dimension: int) -> "Point":
         """Return a point of space in the coordinates of a body; not for axial ones."""
@@ -124,7 +129,12 @@ class Frame(Enum):
             (theta,), (x, y) = turns, away
             cosine, sine = sympy.cos(theta), sympy.sin(theta)
             return _triple([cosine * x + sine * y, cosine * y - sine * x])
-        return _triple(list(rotation_matrix(turns).T * sympy.Matrix(away)))
+        return _triple(list(self._matrix(turns).T * sympy.Matrix(away)))
+
+    def _matrix(self, turns: "Sequence[sympy.Symbol]") -> "sympy.Matrix":
+        import sympy
+
+        return sympy.Matrix(3, 3, turns) if self is Frame.LINKED else rotation_matrix(turns)
 
 
 def symbols(names: Sequence[str]) -> "list[sympy.Symbol]":

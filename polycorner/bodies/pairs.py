@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from polycorner.bodies import gaps
+from polycorner.bodies.chains import Chain
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.gaps import FIRST, SECOND
 from polycorner.bodies.images import Image, nearest_image, own
@@ -50,6 +51,8 @@ class PlacedPart(Value):
         A point of the body, of fixed ones of the part.
     image : Image, optional
         In a periodic box, which image it is.
+    chain : Chain, optional
+        Of a link: how joints place it.
     """
 
     body: str
@@ -60,6 +63,7 @@ class PlacedPart(Value):
     coordinates: tuple[str, ...]
     middle: Array
     image: Image | None = None
+    chain: Chain | None = None
 
     def at(self, mark: str, image: Image) -> "PlacedPart":
         """Return an image of it, with a mark on the name of the body."""
@@ -102,7 +106,12 @@ def function_of(
     label: str,
     member: str = "gap",
 ) -> SmoothFunction:
-    """Return a member of a family as a function of what it reads of two bodies."""
+    """Return a member of a family as a function of what it reads of two bodies.
+
+    Of two links one has the chain that leads to it from the other, which is fixed.
+    """
+    if chain := one.chain or (two and two.chain):
+        return chain.function(manifold, family, parameters, label, member)
     if two is not None and (one.image or two.image):
         family, further = _imaged(family, one, two)
         parameters = parameters + further

@@ -5,10 +5,11 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 from polycorner import checks
-from polycorner.bodies.dynamics import between
+from polycorner.bodies.dynamics import between, twins
 from polycorner.bodies.laws import Meeting, laws_of
 from polycorner.bodies.pairs import distances
 from polycorner.bodies.poses import Placement
+from polycorner.bodies.scenes import KindsInSpace
 from polycorner.motion.assembly import Assembly
 
 
@@ -59,11 +60,18 @@ def assembly(
         for p, q in pairs
         if p is not q or count.get(p.name, 1) > 1
     }
-    return Assembly(found, count, families)
+
+    def met(one: str, two: str) -> Any:
+        by_name = {p.name: p for p in alone}
+        return twins((by_name[one], by_name[two]), alone[by_name[one]].lattice)
+
+    scenes = {name: system.scene for name, system in found.items()}
+    ordered = {name: count[name] for name in found}
+    return Assembly(found, count, families, KindsInSpace(scenes, ordered, met))
 
 
 def _touched(one: Any) -> list[Meeting]:
     """Return the contacts of a single body with walls and fixed bodies."""
     touches = [t for pair in one.pairs for t in distances(one.manifold, *pair)]
     found = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
-    return [*found, *(Meeting(f.name, member.body, on) for _, f, member, _, on in one.at_walls)]
+    return [*found, *(Meeting(t.gap.name, t.member.body, t.name) for t in one.at_walls)]

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from polycorner import checks
 from polycorner.checks import refuse
 from polycorner.kinds import checked
+from polycorner.printing import few
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, Value, cached_property
@@ -144,6 +145,17 @@ class Part(Checked):
         heights = self.points @ self.facets.normals.T
         return self.radius + float(np.ptp(heights, axis=0).min()) / 2
 
+    @property
+    def described(self) -> str:
+        """The shape in words."""
+        k, plane = len(self.points), self.dimension == 2
+        if k == 1:
+            return f"{'disc' if plane else 'ball'} of radius {self.radius:g}"
+        if k == 2:
+            return f"capsule of radius {self.radius:g}"
+        rounded = f", rounded by {self.radius:g}" if self.radius else ""
+        return f"{'polygon' if plane else 'polyhedron'} of {k} vertices{rounded}"
+
     def moved(self, by: Array, matrix: Array) -> "Part":
         """Return it turned about the origin, then shifted."""
         return Part(self.points @ matrix.T + by, self.radius)
@@ -163,6 +175,16 @@ class Body(Checked):
     """
 
     parts: dict[str, Part]
+
+    def __repr__(self) -> str:
+        """Return the shape in words."""
+        return f"Body({self.described})"
+
+    @property
+    def described(self) -> str:
+        """The shape in words."""
+        shapes = [part.described for part in self.parts.values()]
+        return shapes[0] if len(shapes) == 1 else f"{len(shapes)} parts: {few(shapes)}"
 
     @property
     def dimension(self) -> int:

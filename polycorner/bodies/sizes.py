@@ -95,8 +95,8 @@ def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True)
         for one, two in arrangement.pairs
     ]
     gaps += [
-        _lifted(f, manifold, partial(_thinner, 1.0 if isinstance(wall, HalfSpace) else -1.0))
-        for wall, f, *_ in arrangement.at_walls
+        _lifted(t.gap, manifold, partial(_thinner, 1.0 if isinstance(t.wall, HalfSpace) else -1.0))
+        for t in arrangement.at_walls
     ]
     t = manifold.symbols[-1]
     least = min(radii.values())
@@ -159,10 +159,10 @@ def scaled(
         )
         for one, two in arrangement.pairs
     ]
-    for wall, function, member, *_ in arrangement.at_walls:
-        radius = member.part.radius
-        moving = radius if isinstance(wall, HalfSpace) else -radius
-        gaps.append(_lifted(function, manifold, partial(_larger, False, moving)))
+    for touch in arrangement.at_walls:
+        radius = touch.member.part.radius
+        moving = radius if isinstance(touch.wall, HalfSpace) else -radius
+        gaps.append(_lifted(touch.gap, manifold, partial(_larger, False, moving)))
     size = manifold.symbols[-1]
     limits = SmoothFunction(FULL, 1 - size, manifold), SmoothFunction(SMALL, size - least, manifold)
     return Polyhedron(manifold, AllOf(*together(gaps), *limits))

@@ -19,7 +19,8 @@ from polycorner.bodies import frames, gaps
 from polycorner.bodies.frames import AXES, Frame, symbols
 from polycorner.bodies.gaps import FIRST, SECOND, beside, given, harmonics, numbers
 from polycorner.bodies.pairs import PlacedPart, Touch, function_of
-from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
+from polycorner.bodies.shapes import Part
+from polycorner.bodies.walls import Cylinder, HalfSpace, WallTouch
 from polycorner.bodies.waves import waves
 from polycorner.formulas import cache
 from polycorner.formulas.expressions import as_expression
@@ -42,7 +43,7 @@ from polycorner.spaces.distances import (
     scaled,
     zero,
 )
-from polycorner.spaces.manifold import Array, Manifold
+from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
     import sympy
@@ -53,9 +54,6 @@ if TYPE_CHECKING:
 SLIDING, ROLLING = "sliding", "rolling"
 COMPONENTS = ("s0", "s1")
 SPIN = ("spin0", "spin1", "spin2")  # angular velocity of a wall
-
-AtWall = tuple[str, Wall, PlacedPart, Array]  # name of the contact, wall, part, point
-
 
 # Nearest points of two parts that touch, and the normal there.  Quantities in between are
 # *defined*: to SymPy they are symbols, so that formulas stay short however many faces there are.
@@ -203,9 +201,7 @@ def slips_of(space: Manifold, touch: Touch, kind: str) -> tuple[SmoothFunction, 
         jumps between a side and a vertex.
     """
     one, two, d = touch.one, touch.two, touch.one.part.dimension
-    r, s = one.part.radius, two.part.radius
-    if kind == ROLLING:
-        r = r * s / (r + s) if r and s else 0.0
+    r = rolling_arm(one.part, two.part) if kind == ROLLING else one.part.radius
     values = [*one.numbers(*touch.first), *two.numbers(*touch.second)]
     features, hull = Features(len(touch.first), len(touch.second)), two.part.facets
     if features.second > 2 and hull is not None:
@@ -224,14 +220,21 @@ def slips_of(space: Manifold, touch: Touch, kind: str) -> tuple[SmoothFunction, 
     return _functions(space, family, one, two, [*values, r], touch.gap.name)
 
 
-def slips_at_wall(space: Manifold, touch: AtWall, kind: str) -> tuple[SmoothFunction, ...]:
+def rolling_arm(one: Part, two: Part) -> float:
+    """Return the length by which rolling of two parts on each other counts as a displacement."""
+    r, s = one.radius, two.radius
+    return r * s / (r + s) if r and s else 0.0
+
+
+def slips_at_wall(space: Manifold, touch: WallTouch, kind: str) -> tuple[SmoothFunction, ...]:
     """Return the slip or rolling velocity of a point of a body at a wall, which may turn."""
-    label, wall, member, point = touch
-    r, gap = member.part.radius, wall.family(member.frame)
+    gap, member, point, wall, _ = touch
+    label = gap.name
+    r, distance = member.part.radius, wall.family(member.frame)
     values = [*member.numbers(point), *wall.numbers(r), r, *wall.angular_velocity.tolist()]
     waviness = len(wall.waves) if isinstance(wall, Cylinder) else 0
     flat = isinstance(wall, HalfSpace)
-    family = _at_wall(kind, gap, member.frame, wall.dimension, flat, waviness)
+    family = _at_wall(kind, distance, member.frame, wall.dimension, flat, waviness)
     return _functions(space, family, member, None, values, label)
 
 

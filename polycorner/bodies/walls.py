@@ -6,7 +6,7 @@ inside is convex.  The outside of a cylinder, a sphere or a box is that of a fix
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,6 +48,17 @@ class HalfSpace(Checked):
     def dimension(self) -> int:
         """2 or 3."""
         return len(self.normal)
+
+    @property
+    def described(self) -> str:
+        """The wall in words."""
+        axes = "xyz"
+        for axis, x in zip(axes, self.normal.tolist(), strict=False):
+            if abs(x) == 1:
+                level = self.point[axes.index(axis)]
+                return f"{axis} {'>=' if x > 0 else '<='} {level:g}"
+        normal = ", ".join(f"{x:g}" for x in self.normal)
+        return f"half-space with normal ({normal})"
 
     def family(self, frame: Frame) -> Family:
         """Return the gap of a point of a body."""
@@ -124,6 +135,14 @@ class Cylinder(Checked):
         """2 or 3."""
         return len(self.point)
 
+    @property
+    def described(self) -> str:
+        """The wall in words."""
+        planar = "circle" if self.dimension == 2 else "sphere"
+        kind = planar if self.axis is None else "cylinder"
+        waves = " with waves" if self.waves else ""
+        return f"inside of a {kind} of radius {self.radius:g}{waves}"
+
     def family(self, frame: Frame) -> Family:
         """Return the gap of a point of a body."""
         return gaps.hollow(frame, self.dimension, len(self.waves))
@@ -190,10 +209,29 @@ def box(low: ArrayLike, high: ArrayLike) -> dict[str, HalfSpace]:
     return walls
 
 
-def within(
-    manifold: Manifold, name: str, wall: Wall, member: PlacedPart
-) -> list[tuple[SmoothFunction, Array]]:
-    """Return the gaps of a part and a wall, and the points of the part that they are of."""
+class WallTouch(NamedTuple):
+    """The gap of a part at a wall, and which point of the part it is of.
+
+    Attributes
+    ----------
+    gap : SmoothFunction
+    member : PlacedPart
+    point : (d,) array
+        In coordinates of the body.
+    wall : HalfSpace or Cylinder
+    name : str
+        Name of the wall.
+    """
+
+    gap: SmoothFunction
+    member: PlacedPart
+    point: Array
+    wall: Wall
+    name: str
+
+
+def within(manifold: Manifold, name: str, wall: Wall, member: PlacedPart) -> list[WallTouch]:
+    """Return the gaps of a part and a wall."""
     radius = member.part.radius
     if isinstance(wall, Cylinder) and wall.radius - wave_depth(wall.waves) <= radius:
         room = f" plus {wave_depth(wall.waves):g} for its waves" if wall.waves else ""
@@ -206,7 +244,7 @@ def within(
     for i, p in points:
         given, label = [*member.numbers(p), *numbers], f"{member.vertex(i)}-{name}"
         function = function_of(manifold, family, member, None, given, label)
-        found.append((function, p))
+        found.append(WallTouch(function, member, p, wall, name))
     return found
 
 

@@ -24,7 +24,13 @@ from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import EventKind
 from polycorner.motion.mechanics import MechanicalSystem
 from polycorner.motion.noise import Noise
-from polycorner.motion.tables import event_table, read_events, read_touches, touch_table
+from polycorner.motion.tables import (
+    event_table,
+    read_events,
+    read_friction,
+    read_touches,
+    touch_table,
+)
 from polycorner.motion.trajectory import Trajectory
 from polycorner.spaces.manifold import Array
 
@@ -40,6 +46,7 @@ LENGTH = b"This is a netCDF dimension but not a netCDF variable"  # has no numbe
 EFFORT = tuple(field.name for field in fields(Effort))
 T = TypeVar("T")
 PARTICIPANTS = ("body_1", "body_2", "contact")
+RUBBING = ("instant", "body_1", "body_2", "law")
 
 
 def check_structure(content: bytes, stream: Any) -> None:
@@ -156,7 +163,18 @@ def _touches(path: Trajectory, names: Sequence[str], units: MotionUnits) -> dict
         words = f"touching contacts: {name}, counted from 0 (-1: none)"
         data[f"touch_{name}"] = column(("touch",), table["touch"][:, k], "1", words)
     force = column(("touch",), table["touch_force"], units.force, "normal force")
-    return data | {"touch_force": force}
+    return data | {"touch_force": force} | _rubbing(path, units)
+
+
+def _rubbing(path: Trajectory, units: MotionUnits) -> dict[str, Any]:
+    data: dict[str, Any] = {}
+    for k, name in enumerate(RUBBING):
+        words = f"friction: {name}, counted from 0 (-1: none)"
+        data[f"rub_{name}"] = column(("rub",), path.friction.whole[:, k], "1", words)
+    for k in range(2):
+        words = f"component {k} of the friction"
+        data[f"rub_force_{k}"] = column(("rub",), path.friction.forces[:, k], units.force, words)
+    return data
 
 
 def _events(path: Trajectory, names: Sequence[str], units: MotionUnits) -> dict[str, Any]:
@@ -237,6 +255,11 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
     if not T or (np.diff(times) <= 0).any():
         refuse("time", "increasing times", times.tolist())
     touches = {"touch": table("touch", "instant"), "touch_force": of("touch_force", -1)}
+    rubbing: dict[str, Any] = {}
+    if "rub_law" in content:
+        whole = [of(f"rub_{name}", -1, kind="i") for name in RUBBING]
+        forces = [of(f"rub_force_{k}", -1) for k in range(2)]
+        rubbing = {"rub": np.stack(whole, axis=1), "rub_force": np.stack(forces, axis=1)}
     numbers = np.stack([of("event_time", -1), of("event_impulse", -1)], axis=1)
     events = {"event": table("event", "kind"), "event_numbers": numbers}
     whole = {
@@ -267,6 +290,7 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         every=checks.whole("every", at["every"], least=1),
         t_end=None if math.isnan(at["t_end"]) else checks.real("t_end", at["t_end"]),
         steps_per_second=float(at["steps_per_second"]),
+        friction=read_friction(rubbing, bodies.rubbing, T, bodies.total),
     )
 
 

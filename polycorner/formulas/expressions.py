@@ -38,11 +38,21 @@ def as_expression(argument: str, value: object) -> "sympy.Expr":
     result = sympy.sympify(value, strict=True) if known else None
     if isinstance(result, sympy.core.relational.Relational):
         refuse(argument, "f, meaning f >= 0, instead of an inequality", result, TypeError)
-    if result is not None and result.has(sympy.nan, sympy.zoo, sympy.I):
+    if result is not None and not _parts(result).isdisjoint({sympy.nan, sympy.zoo, sympy.I}):
         refuse(argument, "a formula of real values", result)
     if not isinstance(result, sympy.Expr):
         refuse(argument, "a SymPy expression", value, TypeError)
     return result
+
+
+def _parts(expression: "sympy.Basic") -> "set[sympy.Basic]":
+    """Return all subexpressions; each is visited once, however often it is repeated."""
+    seen, waiting = {expression}, [expression]
+    while waiting:
+        fresh = set(waiting.pop().args) - seen
+        seen |= fresh
+        waiting += fresh
+    return seen
 
 
 def as_expressions(argument: str, given: "Mapping[str, Any]") -> "dict[str, sympy.Expr]":

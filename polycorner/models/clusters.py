@@ -19,6 +19,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.models.spheres import VARIABLES, SphereCluster
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
@@ -45,7 +46,7 @@ def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
 
 
 @dataclass(frozen=True)
-class LennardJones(Checked):
+class LennardJones(Checked, Described):
     """Atoms in space with the potential of Lennard-Jones.
 
     Coordinates are ``x1 y1 z1 ... xn yn zn``.  The only inequality, ``extent``, bounds the radius

@@ -20,6 +20,7 @@ from polycorner.kinds import checked
 from polycorner.models.planar import Wall, meeting_corners, positive, uniform_points
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.printing import Described
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
@@ -49,7 +50,7 @@ CUPS = ((4.3, 3.1, 0.5, 0.65), (6.0, 4.7, 0.6, 0.75))
 
 
 @dataclass(frozen=True)
-class Pinball(Checked):
+class Pinball(Checked, Described):
     """A point ball on a tilted board between walls, among pins, wedges and cups.
 
     Coordinates are ``x`` across the board and ``y`` up the board, from its lower left corner.

@@ -23,6 +23,7 @@ from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Relabelling, Symmetry
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
@@ -46,7 +47,7 @@ def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
 
 
 @dataclass(frozen=True)
-class SphereCluster(Checked):
+class SphereCluster(Checked, Described):
     """``n`` hard spheres of unit diameter in space.
 
     Coordinates are ``x1 y1 z1 ... xn yn zn``, in diameters.  The contact of spheres ``i < j`` is

@@ -17,9 +17,10 @@ from .mechanics import MechanicalSystem, State
 from .noise import MotionOptions, Noise, Solver
 from .random_functions import random_field, random_signal
 from .rotations import angular_velocity, rotational_energy
+from .scenes import ContactForce, ContactForces
 from .simulation import simulate, step
 from .system import System
-from .trajectory import MotionOfKind, Trajectory
+from .trajectory import MotionOfKind, Trajectory, contact_forces
 
 __all__ = [
     "Accelerations",
@@ -27,6 +28,8 @@ __all__ = [
     "Checkpoint",
     "Consistency",
     "ContactFamily",
+    "ContactForce",
+    "ContactForces",
     "ConvexPolygon",
     "ConvexSet",
     "CutDisc",
@@ -47,6 +50,7 @@ __all__ = [
     "Trajectory",
     "accelerations",
     "angular_velocity",
+    "contact_forces",
     "motions",
     "pair_coordinates",
     "pair_velocities",

@@ -1,7 +1,8 @@
 """Assemblies: many bodies of several kinds, each repeated."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,11 @@ from polycorner.kinds import checked
 from polycorner.motion.bodies import IdenticalBodies, PairContacts, SeveralKinds
 from polycorner.motion.contacts import ContactFamily, periods_of, position_of
 from polycorner.motion.formulation import energies
+from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.placements import check_contacts, check_equations, check_velocities
-from polycorner.motion.system import System, leapfrog_limit
+from polycorner.motion.scenes import Scene
+from polycorner.motion.system import System, leapfrog_limit, overlapping
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
@@ -38,6 +41,8 @@ class Assembly(MechanicalSystem):
     between : mapping from (str, str) to ContactFamily, optional
         Contacts of any two bodies of one kind, or of two: the first of the pair has the coordinates
         with 1.  Bodies of pairs that are left out pass through each other.
+    scene : Scene, optional
+        Names of the bodies in space, and where they touch.
 
     Raises
     ------
@@ -73,7 +78,8 @@ class Assembly(MechanicalSystem):
 
     kinds: Mapping[str, System]
     count: Mapping[str, int]
-    between: Mapping[Pair, ContactFamily] = field(default_factory=dict)
+    between: Mapping[Pair, ContactFamily | HullContacts] = field(default_factory=dict)
+    scene: Scene | None = None
 
     def __post_init__(self) -> None:
         kinds, count = mapping("kinds", self.kinds), mapping("count", self.count)
@@ -95,12 +101,13 @@ class Assembly(MechanicalSystem):
         super().__post_init__()
 
     def _order_pairs(self) -> None:
-        order, found = list(self.kinds), dict[Pair, ContactFamily]()
+        order, found = list(self.kinds), dict[Pair, ContactFamily | HullContacts]()
         for pair, family in mapping("between", self.between).items():
             if not (isinstance(pair, tuple) and len(pair) == 2):
                 refuse("between", "pairs of kinds", pair)
             names("between", pair, self.kinds)
-            instance("between", family, ContactFamily)
+            if not isinstance(family, HullContacts):
+                instance("between", family, ContactFamily)
             if order.index(pair[0]) > order.index(pair[1]):
                 refuse("between", f"pairs in the order of the kinds, {', '.join(order)}", pair)
             either = {n for name in pair for n in self.kinds[name].manifold.names}
@@ -199,7 +206,7 @@ class Assembly(MechanicalSystem):
         self.check_placement(places)
         sticks = [np.empty(0, dtype=np.bool_)]
         for name, kind in self.kinds.items():
-            check_velocities(kind.polyhedron, each[name], moved[name], name)
+            check_velocities(kind.polyhedron, each[name], moved[name], self._called(name))
             sticks.append(kind.sticks(each[name], moved[name]).ravel())
         return State(real("time", time, unit="s"), places, speeds, np.concatenate(sticks))
 
@@ -207,9 +214,20 @@ class Assembly(MechanicalSystem):
     def check_placement(self, q: Array) -> None:
         """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
         for name, places in self.split(q).items():
-            check_contacts(self.kinds[name].polyhedron, places, name)
-            check_equations(self.kinds[name].polyhedron, places, name)
+            kind, called = self.kinds[name], self._called(name)
+            check_contacts(kind.polyhedron, places, partial(self._who, name))
+            check_equations(kind.polyhedron, places, called)
         self.bodies.check_apart(self.bodies.padded(q))
+
+    def _called(self, name: str) -> Callable[[int], str]:
+        """Return what gives the bodies of a kind their names in messages."""
+        start = self.bodies.starts[list(self.kinds).index(name)]
+        return lambda i: self.bodies.called(start + i)
+
+    def _who(self, name: str, contact: str, i: int) -> str:
+        """Return what overlaps at a contact of a body of a kind, for a message."""
+        i += self.bodies.starts[list(self.kinds).index(name)]
+        return overlapping(self.scene, self.bodies.called(i), contact, i)
 
     @checked
     def energies(self, state: State) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Descriptions of bodies and of their contacts: what the engine needs to know of a system."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -12,6 +12,7 @@ from polycorner.formulas.families import Family
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import Formulation
 from polycorner.motion.noise import OPTIONS
+from polycorner.motion.scenes import Rubbing
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value, cached_property
 
@@ -167,6 +168,49 @@ class MovingBodies(Value):
         raise NotImplementedError
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the bodies, for messages; of a dense system of those that it consists of."""
+        return tuple(
+            f"{label} {k}"
+            for label, kind in zip(self.labels, self.kinds, strict=True)
+            for k in range(1, kind.count + 1)
+        )
+
+    def called(self, i: int) -> str:
+        """Return what a body is called in messages: its name, or else its number."""
+        if len(self.names) != self.total:
+            return f"body {i}"
+        return f"body {self.names[i]!r}"
+
+    @cached_property
+    def rubbing(self) -> tuple[Rubbing, ...]:
+        """The laws of friction: of each kind with its surroundings, then of pairs, gap by gap."""
+        own = [
+            Rubbing(kind.body.contacts[f.gap] if f.gap >= 0 else f.name, f.cause, f.rows)
+            for kind in self.kinds
+            for f in kind.body.friction
+        ]
+        pair = [
+            Rubbing(g, law.cause, law.rows)
+            for family in self.families.values()
+            for g in family.gaps.names
+            for law in family.laws
+        ]
+        return (*own, *pair)
+
+    def law(self, i: int, j: int, which: int) -> int:
+        """Return the number of a law among all: of one body, or of a pair, law after law."""
+        own = np.cumsum([0, *(len(kind.body.friction) for kind in self.kinds)]).tolist()
+        if j < 0:
+            return int(own[self.kind_of[i]]) + which
+        before, pair = own[-1], (int(self.kind_of[i]), int(self.kind_of[j]))
+        for known, family in self.families.items():
+            if known == pair:
+                break
+            before += len(family.gaps.names) * len(family.laws)
+        return int(before) + which
+
+    @property
     def families(self) -> Mapping[tuple[int, int], PairContacts]:
         """The contacts of any two bodies."""
         raise NotImplementedError
@@ -272,13 +316,6 @@ class MovingBodies(Value):
         parts = [q[..., at, : kind.dimension] for kind, at in self.slices]
         return np.concatenate([part.reshape(*q.shape[:-2], -1) for part in parts], axis=-1)
 
-    def name_of(self, i: int) -> str:
-        """Return what a body is called in messages."""
-        if not self.labels:
-            return f"body {i}"
-        kind = self.kind_of[i]
-        return f"{self.labels[kind]} {i - self.starts[kind] + 1}"
-
     def check_places(self, q: Array, v: Array, dt: float) -> None:
         """Raise ValueError where a body, now or a step later, is farther than numbers resolve gaps.
 
@@ -295,7 +332,7 @@ class MovingBodies(Value):
                 msg = (
                     f"state: expected coordinates that numbers resolve to {unit:g}, the "
                     f"unit of gaps, also a step later; got {name} = {q[i, c]:.6g} of "
-                    f"{self.name_of(i)} with the velocity {v[i, c]:.6g}"
+                    f"{self.called(i)} with the velocity {v[i, c]:.6g}"
                 )
                 raise ValueError(msg)
 
@@ -312,9 +349,8 @@ class MovingBodies(Value):
         """Raise ValueError if two bodies overlap, naming those that do most; ``q`` as below."""
         gap, (i, j), name = self.least_pair_gap(q)
         if gap < -OPTIONS.overlap * self.gap_unit:
-            who = (
-                f"{self.name_of(i)} and {self.name_of(j)}" if self.labels else f"bodies {i} and {j}"
-            )
+            one, two = (self.called(k).removeprefix("body ") for k in (i, j))
+            who = f"bodies {one} and {two}"
             msg = (
                 f"q: expected a placement without overlap; {who} overlap by "
                 f"{-gap:.6g} at contact {name!r}"
@@ -337,6 +373,18 @@ class MovingBodies(Value):
         contact : str
         """
         least = (np.inf, (0, 0), "")
+        for (i, j), names, values in self.near_pairs(q):
+            worst = int(np.argmin(values))
+            least = min(least, (float(values[worst]), (i, j), names[worst]))
+        return least
+
+    def near_pairs(
+        self, q: Array, beyond: float = 0.0
+    ) -> Iterator[tuple[tuple[int, int], tuple[str, ...], Array]]:
+        """Yield pairs of bodies within their reach, or not far beyond, and names and gaps.
+
+        ``beyond`` is a length, as the reach.
+        """
         positions, starts = self.positions(q), self.starts
         for (a, b), contacts in self.families.items():
             numbers = np.array([*contacts.parameters, 0.0])
@@ -347,13 +395,32 @@ class MovingBodies(Value):
                     if np.isfinite(period):
                         x = away[:, component]
                         x -= period * np.floor(x / period + 0.5)
-                near = np.flatnonzero(np.linalg.norm(away, axis=1) < contacts.reach)
+                near = np.flatnonzero(np.linalg.norm(away, axis=1) < contacts.reach + beyond)
                 for j in (first + near).tolist():
                     at = np.array([q[(i, j)[body], c] for body, c in contacts.reads])
                     (values,) = contacts.gaps.kernel.at(at, numbers.ctypes.data, 0)
-                    worst = int(np.argmin(values))
-                    least = min(least, (float(values[worst]), (i, j), contacts.gaps.names[worst]))
-        return least
+                    yield (i, j), contacts.gaps.names, values
+
+    def touching(self, q: Array, limit: float) -> list[tuple[tuple[int, ...], str]]:
+        """Return the bodies and names of the contacts whose gaps are within a scaled limit."""
+        found: list[tuple[tuple[int, ...], str]] = []
+        length = limit * self.gap_unit
+        for kind, at in self.slices:
+            body, places = kind.body, np.ascontiguousarray(q[at, : kind.dimension])
+            gaps = np.full((kind.count, len(body.contacts)), np.inf)
+            for call in body.gaps:
+                (values,) = call.family.kernel.over(
+                    places[:, list(call.reads)], call.parameters.ctypes.data, 0
+                )
+                gaps[:, list(call.rows)] = values[:, list(call.columns)]
+            unilateral = len(body.contacts) - body.equations
+            found += [
+                ((at.start + int(i),), body.contacts[g])
+                for i, g in np.argwhere(gaps[:, :unilateral] <= length)
+            ]
+        for bodies, names, values in self.near_pairs(q, 2 * limit):
+            found += [(bodies, names[g]) for g in np.flatnonzero(values <= length)]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -374,6 +441,8 @@ class IdenticalBodies(MovingBodies):
         Speed of the substrate along the first of them, as a length per time.
     exit_coordinate, exit_limit : int, float
         A body leaves when this coordinate exceeds the limit; -1: never.
+    names : tuple of str
+        Of the bodies; of a dense system of those that it consists of.
     """
 
     body: MovingBody
@@ -384,6 +453,7 @@ class IdenticalBodies(MovingBodies):
     substrate_speed: float = 0.0
     exit_coordinate: int = -1
     exit_limit: float = 0.0
+    names: tuple[str, ...] = ()
 
     @property
     def kinds(self) -> "tuple[IdenticalBodies, ...]":

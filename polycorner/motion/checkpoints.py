@@ -23,7 +23,8 @@ from polycorner.container import BINARY, FileKind
 from polycorner.kinds import check_fields
 from polycorner.motion.events import joined
 from polycorner.motion.recorder import Recorder
-from polycorner.motion.tables import event_arrays, touch_table
+from polycorner.motion.scenes import FrictionTable, friction_table
+from polycorner.motion.tables import event_arrays, friction_arrays, touch_table
 from polycorner.values import Checked
 
 KIND = FileKind("checkpoint", "a simulation", BINARY)
@@ -200,6 +201,9 @@ class SavedRun:
         arrays = {name: np.array(rows[since:]) for name, rows in recorder.columns.items()}
         arrays["left"] = np.array(recorder.left[since:], dtype=np.float64)
         arrays |= touch_table(recorder.touching[since:], names)
+        rubbed = friction_table(recorder.friction[since:])
+        whole = rubbed.whole - np.array([since, 0, 0, 0])
+        arrays |= friction_arrays(FrictionTable(whole, rubbed.forces))
         arrays |= event_arrays(joined(recorder.events[self._events :], names))
         KIND.save_arrays(self._chunk(self._chunks), arrays)
         state = {

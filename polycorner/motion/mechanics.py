@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner.motion.bodies import MovingBodies
 from polycorner.motion.noise import Solver
+from polycorner.motion.scenes import Scene
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, Value
 
@@ -69,6 +70,11 @@ class MechanicalSystem(Value, ABC):
     @abstractmethod
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""
+
+    @property
+    def scene(self) -> Scene | None:
+        """Names of the bodies in space, and where they touch; None if they are not known."""
+        return None
 
     @property
     def hidden(self) -> frozenset[str]:

@@ -1,5 +1,7 @@
 """Checks of placements and velocities against the gaps and equations of a polyhedron."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from polycorner.formulas.bundles import Bundle
@@ -10,7 +12,7 @@ from polycorner.polyhedra.quotients import Quotient
 from polycorner.spaces.manifold import Array
 
 
-def check_contacts(polyhedron: Polyhedron, q: Array, label: str = "") -> None:
+def check_contacts(polyhedron: Polyhedron, q: Array, who: Callable[[str, int], str]) -> None:
     """Raise ValueError if a contact overlaps, naming the worst.
 
     Parameters
@@ -18,22 +20,22 @@ def check_contacts(polyhedron: Polyhedron, q: Array, label: str = "") -> None:
     polyhedron : Polyhedron
     q : (n,) or (N, n) array
         Placement of one body, or of several.
-    label : str, optional
-        What bodies of this kind are called.
+    who : function
+        Returns what overlaps at a contact of a body, in words.
     """
     if not polyhedron.functions:
         return
     gaps = polyhedron.values(q)
     worst = tuple(map(int, np.unravel_index(int(np.argmin(gaps)), gaps.shape)))
     if gaps[worst] < -OPTIONS.overlap * min(polyhedron.manifold.scales):
-        msg = (
-            f"q: expected a placement without overlap; contact {polyhedron.names[worst[-1]]!r}"
-            f"{_which(worst, label)} overlaps by {-gaps[worst]:.6g}"
-        )
+        contact = polyhedron.names[worst[-1]]
+        subject = who(contact, worst[0] if len(worst) > 1 else 0)
+        at = "" if repr(contact) in subject else f" at contact {contact!r}"
+        msg = f"q: expected a placement without overlap; {subject} by {-gaps[worst]:.6g}{at}"
         raise ValueError(msg)
 
 
-def check_equations(polyhedron: Polyhedron, q: Array, label: str = "") -> None:
+def check_equations(polyhedron: Polyhedron, q: Array, called: Callable[[int], str]) -> None:
     """Raise ValueError if an equation does not hold, or is singular, naming the first.
 
     A body may be off by what it may overlap, measured by Newton's step onto the equation.
@@ -43,20 +45,21 @@ def check_equations(polyhedron: Polyhedron, q: Array, label: str = "") -> None:
     values, slopes = polyhedron.equation_values(q), _slopes(polyhedron, q)
     sizes = np.linalg.norm(slopes, axis=-1)
     for at in np.ndindex(values.shape):
-        name, value = polyhedron.equation_names[at[-1]], values[at]
+        name, value = repr(polyhedron.equation_names[at[-1]]) + _which(at, called), values[at]
         if not sizes[at] > 0:
             msg = (
-                f"q: expected a gradient of equation {name!r}{_which(at, label)} that is not zero, "
-                f"for it is the direction of its force; got zero"
+                f"q: expected a gradient of equation {name} that is not zero, for "
+                f"it is the direction of its force; got zero"
             )
             raise ValueError(msg)
         if not abs(value) <= OPTIONS.overlap * sizes[at]:
-            where = _which(at, label)
-            msg = f"q: expected equation {name!r}{where} to hold; its value is {value:.6g}"
+            msg = f"q: expected equation {name} to hold; its value is {value:.6g}"
             raise ValueError(msg)
 
 
-def check_velocities(polyhedron: Polyhedron, q: Array, v: Array, label: str = "") -> None:
+def check_velocities(
+    polyhedron: Polyhedron, q: Array, v: Array, called: Callable[[int], str]
+) -> None:
     """Raise ValueError if velocities are not along an equation, naming the first."""
     if not polyhedron.equations:
         return
@@ -68,7 +71,7 @@ def check_velocities(polyhedron: Polyhedron, q: Array, v: Array, label: str = ""
         if abs(rates[at]) > OPTIONS.overlap * most[at]:
             msg = (
                 f"v: expected velocities along equation {polyhedron.equation_names[at[-1]]!r}"
-                f"{_which(at, label)}; they change it at the rate {rates[at]:.6g}"
+                f"{_which(at, called)}; they change it at the rate {rates[at]:.6g}"
             )
             raise ValueError(msg)
 
@@ -95,7 +98,5 @@ def _slopes(polyhedron: Polyhedron, q: Array) -> Array:
     return np.asarray(found)
 
 
-def _which(at: tuple[int, ...], label: str) -> str:
-    if label:
-        return f" of {label} {at[0] + 1}"
-    return f" of body {at[0]}" if len(at) > 1 else ""
+def _which(at: tuple[int, ...], called: Callable[[int], str]) -> str:
+    return f" of {called(at[0])}" if len(at) > 1 else ""

@@ -6,6 +6,7 @@ Many of them are indices, and compiled code does not look whether these are with
 """
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,8 +17,10 @@ from polycorner.motion.engine.arrays import CONTACTS, STEPS, EngineState, declar
 from polycorner.motion.engine.driver import Engine
 from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.events import EventKind, EventTable, joined
-from polycorner.motion.tables import read_events, read_touches
+from polycorner.motion.scenes import FrictionTable, friction_table
+from polycorner.motion.tables import read_events, read_friction, read_touches
 from polycorner.motion.trajectory import Touch, Trajectory
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -90,6 +93,7 @@ class Recorder:
             name: [] for name in ("t", "q", "v", "rests", "alive", "energies", "sums")
         }
         self.touching: list[tuple[Touch, ...]] = []
+        self.friction: list[FrictionTable] = []  # of one instant after the other
         self.events: list[EventTable] = []  # of one advance after the other
         self.left: list[float] = []
         self.gone = 0.0
@@ -105,10 +109,58 @@ class Recorder:
         add["energies"].append(self.engine.energies())
         add["sums"].append(motion.sums.copy())
         self.touching.append(tuple(self.engine.touching()))
+        self.friction.append(self._rubbing(len(self.left)))
         self.left.append(self.gone)
+
+    def begin(self) -> None:
+        """Do the first step, and note what touches at the start, with the forces of this step.
+
+        The engine knows of contacts after steps only.
+        """
+        engine = self.engine
+        limit = float(engine.model.touching) / engine.bodies.gap_unit
+        self.advance(1)
+        touched = engine.bodies.touching(self.columns["q"][0], limit)
+        every = {*touched, *((some, name) for some, name, _ in self.touching[0])}  # and equations
+        acting = [touch for touch in engine.touching() if touch[:2] in every]
+        opened = every - {touch[:2] for touch in acting}
+        acting += [(*touch, 0.0) for touch in touched if touch in opened]
+        self.touching[0] = tuple(acting)
+        self.friction[0] = self._rubbing(0)
+
+    def _rubbing(self, instant: int) -> FrictionTable:
+        """Return the present friction forces, as those of an instant."""
+        engine = self.engine
+        motion, bodies, model = engine.motion, engine.bodies, engine.model
+        touched = {(some, name) for some, name, _ in self.touching[instant]}
+        laws, families = bodies.rubbing, bodies.families
+        rows: list[tuple[int, int, int]] = []
+        forces: list[Array] = []
+        for at in np.flatnonzero(motion.friction.any(axis=1)).tolist():
+            i = int(np.searchsorted(model.first_friction, at, side="right")) - 1
+            f = at - int(model.first_friction[i])
+            pressed = bodies.kinds[bodies.kind_of[i]].body.friction[f].gap >= 0
+            law = bodies.law(i, -1, f)
+            if motion.alive[i] and (not pressed or ((i,), laws[law].contact) in touched):
+                rows.append((i, -1, law))
+                forces.append(motion.friction[at])
+        for s in np.flatnonzero(motion.pair_flags[: int(motion.counts[CONTACTS]), 1]).tolist():
+            (i, j), g = engine.pair_of(s)
+            family = families[bodies.kind_of[i], bodies.kind_of[j]]
+            if ((i, j), family.gaps.names[g]) not in touched:
+                continue
+            starts = np.cumsum([0, *(law.rows for law in family.laws)]).tolist()
+            for h, (a, b) in enumerate(pairwise(starts)):
+                if (part := motion.pair_impulse[s, 1 + a : 1 + b]).any():
+                    rows.append((i, j, bodies.law(i, j, g * len(family.laws) + h)))
+                    forces.append(np.resize(np.append(part, 0.0), 2))
+        whole = np.array([(instant, *row) for row in rows], dtype=np.int64).reshape(-1, 4)
+        return FrictionTable(whole, np.array(forces).reshape(-1, 2) / engine.dt)
 
     def advance(self, steps: int) -> None:
         """Advance the engine, recording events and the energy that leaves with bodies."""
+        if not steps:
+            return
         happened = self.engine.advance(steps)
         self.events.append(happened)
         for event in happened.of_kind(EventKind.EXIT):
@@ -137,6 +189,12 @@ class Recorder:
             self.columns[name].extend(forms.array(name, chunk[name], kind, (count, *shape)))
         self.left += forms.array("left", chunk["left"], "f", (count,)).tolist()
         self.touching += read_touches(chunk, bodies.contact_names, count, N)
+        table = read_friction(chunk, bodies.rubbing, count, N)
+        for k in range(count):
+            one = slice(*np.searchsorted(table.whole[:, 0], [k, k + 1]))
+            whole = table.whole[one].copy()
+            whole[:, 0] += len(self.friction) - k
+            self.friction.append(FrictionTable(whole, table.forces[one]))
         self.events.append(read_events(chunk, bodies.contact_names, N))
 
     def load(self, state: "Mapping[str, Any]") -> None:
@@ -175,6 +233,7 @@ class Recorder:
             rests=np.array(columns["rests"]),
             present=np.array(columns["alive"]),
             touching=tuple(map(tuple, touching)),
+            friction=friction_table(self.friction),
             kinetic=energies[:, 0],
             potential=energies[:, 1],
             dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(bodies.causes)},

@@ -199,7 +199,8 @@ def _follow(
     asked = threading.Event()
     with first_interrupt(asked.set):
         rate = _advance(recorder, steps, stride, saved, progress, asked)
-        saved.save(recorder, finished=recorder.engine.steps >= steps)
+        if recorder.engine.steps or not steps:  # before the first step there is nothing to save
+            saved.save(recorder, finished=recorder.engine.steps >= steps)
     return rate
 
 
@@ -215,7 +216,9 @@ def _advance(
     counted, spent, first, last_save = 0, 0.0, True, time.monotonic()
     while engine.steps < steps and not asked.is_set():
         before, clock = engine.steps, time.perf_counter()
-        recorder.advance(min(stride, steps - before))
+        if not before:
+            recorder.begin()
+        recorder.advance(min(stride, steps - before) - (engine.steps - before))
         if not first:
             counted += engine.steps - before
             spent += time.perf_counter() - clock

@@ -1,9 +1,9 @@
 """Mechanical systems written in SymPy: energies, contacts, joints, friction, several bodies."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,21 +13,32 @@ from polycorner.checks import names, real, reals, refuse, whole
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.kinds import check_fields, checked
 from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
-from polycorner.motion.contacts import ContactFamily, Friction, periods_of, position_of, slip_text
+from polycorner.motion.contacts import (
+    ContactFamily,
+    Friction,
+    FrictionLaw,
+    periods_of,
+    position_of,
+    slip_text,
+)
 from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
+from polycorner.motion.scenes import Scene
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.printing import Printed, Sheet, brief, facts, few, listed, number
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy
 
+MOST_TERMS = 50  # of an energy that is written out
+
 
 @dataclass(frozen=True, eq=False)
-class System(MechanicalSystem):
+class System(MechanicalSystem, Printed):
     """One body, or several identical ones, with unilateral contacts and friction.
 
     Parameters
@@ -58,6 +69,8 @@ class System(MechanicalSystem):
         at rest on it move with it.  The slip of :class:`Friction` has to be relative to it.
     exits : mapping from str to float, optional
         A coordinate and its limit: a body that passes it leaves the system for good.
+    scene : Scene, optional
+        Names of the bodies in space, and where they touch; of systems of an arrangement.
 
     Raises
     ------
@@ -115,6 +128,53 @@ class System(MechanicalSystem):
     between: ContactFamily | HullContacts | None = None
     substrate: Mapping[str, float] = field(default_factory=dict)
     exits: Mapping[str, float] = field(default_factory=dict)
+    scene: Scene | None = None
+
+    def __repr__(self) -> str:
+        """Return the bodies, and the numbers of coordinates, contacts and laws of friction."""
+        called = "" if self.scene is None else f" {few(self.scene.names)}"
+        several = (
+            (max(self.count, len(self.bodies.names)), "body", "bodies", called),
+            (self.manifold.size, "coordinate", "coordinates", " each" * (self.count > 1)),
+            (len(self._normals), "contact", "contacts", ""),
+            (len(self.bodies.rubbing), "law of friction", "laws of friction", ""),
+        )
+        told = (f"{n} {one if n == 1 else many}{more}" for n, one, many, more in several)
+        return f"System({'; '.join(told)})"
+
+    def _sheet(self) -> Sheet:
+        names = self.bodies.names
+        about = [
+            ("bodies", f"{max(self.count, len(names))}{': ' * bool(names)}{few(names)}"),
+            ("coordinates", f"{few(self.manifold.names)}{' each' * (self.count > 1)}"),
+            ("kinetic energy", _short(self.kinetic)),
+            ("potential energy", _short(self.potential)),
+            ("forces on", few(self.forces)),
+            ("substrate", few(f"{name} at {x:g}" for name, x in self.substrate.items())),
+            ("exits", few(f"{name} > {x:g}" for name, x in self.exits.items())),
+        ]
+        pairs = () if self.between is None or self.count == 1 else self.between.gaps
+        contacts = listed(
+            "Contacts",
+            ("contact", "friction", "restitution"),
+            chain(self._contact_rows(), self._pair_rows() if pairs else ()),
+            len(self._normals) + len(pairs),
+        )
+        return Sheet("System", (facts((what, told) for what, told in about if told), contacts))
+
+    def _contact_rows(self) -> Iterator[tuple[str, str, str]]:
+        laws: dict[str, list[Friction]] = {}
+        for f in self.friction:
+            laws.setdefault(str(f.load), []).append(f)
+        bounces = [number(e, 6) for e in self.restitutions.tolist()]
+        bounces += ["an equation"] * len(self.polyhedron.equations)
+        for name, e in zip(self._normals, bounces, strict=True):
+            yield name, _told(laws.get(name, ())), e
+
+    def _pair_rows(self) -> Iterator[tuple[str, str, str]]:
+        assert self.between is not None
+        for name in self.between.gaps:
+            yield name, _told(self.between.friction), number(self.between.restitution, 6)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kinetic", as_expression("kinetic", self.kinetic))
@@ -235,7 +295,8 @@ class System(MechanicalSystem):
         leaving = [(coordinates.index(x), limit) for x, limit in self.exits.items()]
         exit_at, limit = leaving[0] if leaving else (-1, 0.0)
         told = contacts, position, periods_of(self.manifold, position), float(speed)
-        return IdenticalBodies(body, self.count, *told, exit_at, float(limit))
+        names = () if self.scene is None else self.scene.names
+        return IdenticalBodies(body, self.count, *told, exit_at, float(limit), names)
 
     # -------------------------------------------------------------------------------------- states
 
@@ -269,16 +330,21 @@ class System(MechanicalSystem):
             if array.shape != shape or array.size != self.count * self.manifold.size:
                 refuse(argument, f"shape ({self.count}, {self.manifold.size})", array.shape)
         self.check_placement(places)
-        check_velocities(self.polyhedron, places, speeds)
+        check_velocities(self.polyhedron, places, speeds, self.bodies.called)
         time = real("time", time, unit="s")
         return State(time, places, speeds, self.sticks(places, speeds, time))
 
     @checked
     def check_placement(self, q: Array) -> None:
         """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
-        check_contacts(self.polyhedron, q)
-        check_equations(self.polyhedron, q)
+        check_contacts(self.polyhedron, q, self._who)
+        check_equations(self.polyhedron, q, self.bodies.called)
         self.bodies.check_apart(q.reshape(self.count, -1))
+
+    def _who(self, contact: str, i: int) -> str:
+        """Return what overlaps at a contact with the surroundings, for a message."""
+        called = self.bodies.called(i) if self.count > 1 else ""
+        return overlapping(self.scene, called, contact, i)
 
     def sticks(self, q: Array, v: Array, time: float = 0.0) -> NDArray[np.bool_]:
         """Return for each friction contact whether its slip is zero, ``(..., F)``."""
@@ -348,3 +414,28 @@ def leapfrog_limit(system: System, places: Array, speeds: Array) -> tuple[float,
     )
     longest = 2 / math.sqrt(squared) if squared > 1e-12 else math.inf
     return longest, "beyond which the motion is unstable"
+
+
+def overlapping(scene: Scene | None, called: str, contact: str, i: int) -> str:
+    """Return what overlaps at a contact of a body with the surroundings, for a message."""
+    parties = () if scene is None else scene.parties((i,), contact)
+    if scene is None or not parties:
+        return f"contact {contact!r}{called and f' of {called}'} overlaps"
+    one, two = parties
+    if two in scene.walls:
+        return f"body {one!r} and wall {two!r} overlap"
+    return f"bodies {one!r} and {two!r} overlap"
+
+
+def _told(laws: Sequence[FrictionLaw]) -> str:
+    """Return laws of friction in words."""
+    return "; ".join(
+        f"{f.kind} {f.static}" + (f", then {f.moving}" if f.moving != f.static else "")
+        for f in laws
+    )
+
+
+def _short(energy: "sympy.Expr | float") -> str:
+    """Return a formula, or what it is where writing it would take long."""
+    terms = len(getattr(energy, "args", ()))
+    return f"a sum of {terms} terms" if terms > MOST_TERMS else brief(energy)

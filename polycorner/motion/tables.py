@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from polycorner import forms
 from polycorner.motion.events import Event, EventKind, EventTable
+from polycorner.motion.scenes import FrictionTable, Rubbing
 from polycorner.motion.trajectory import Touch
 
 
@@ -32,6 +33,21 @@ def read_touches(
     for (index, i, j, which), force in zip(whole.tolist(), forces.tolist(), strict=True):
         found[index].append(((i,) if j < 0 else (i, j), names[which], force))
     return [tuple(touches) for touches in found]
+
+
+def read_friction(table: Any, laws: Sequence[Rubbing], count: int, bodies: int) -> FrictionTable:
+    """Return friction forces by instant, which files of earlier versions do not have."""
+    if "rub" not in table:
+        return FrictionTable()
+    sizes = (count, bodies, bodies, len(laws))
+    whole = _positions("rub", table["rub"], sizes, (0, 0, -1, 0))
+    forms.array("rub", np.diff(whole[:, 0]), "i", (-1,), least=0)
+    return FrictionTable(whole, forms.array("rub_force", table["rub_force"], "f", (len(whole), 2)))
+
+
+def friction_arrays(table: FrictionTable) -> dict[str, Any]:
+    """Return the arrays of friction forces, by the names that they have in files."""
+    return {"rub": table.whole, "rub_force": table.forces}
 
 
 def event_table(events: Iterable[Event], names: Sequence[str]) -> dict[str, Any]:

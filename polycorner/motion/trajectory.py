@@ -3,21 +3,22 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import zip_longest
+from itertools import starmap, zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.checks import names
+from polycorner import checks
 from polycorner.kinds import checked
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
 from polycorner.motion.mechanics import MechanicalSystem
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.placements import onto_equations
+from polycorner.motion.scenes import ContactForce, ContactForces, FrictionTable
 from polycorner.motion.system import System
-from polycorner.printing import Printed, Sheet, Table, facts, listed, number, titled
+from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, Value
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from polycorner.polyhedra.strata import Stratum
 
+ROLLING = "rolling"  # the kind of friction that is a torque
 ANGLES = "Angles are in radians, times in s, all else in the units of the system."
 Touch = tuple[tuple[int, ...], str, float]
 
@@ -68,7 +70,10 @@ class Trajectory(Checked, Printed):
         Which bodies are at rest on their substrate, and which have not left.
     touching : tuple of T tuples
         Contacts that touch at each instant, and all equations: bodies, name, and the force, along
-        the gradient of the gap or equation.
+        the gradient of the gap or equation: its mean over the step before the instant, and at the
+        start over the first step.
+    friction : FrictionTable
+        The forces of friction at these contacts; :meth:`contacts` lists them.
     kinetic, potential : (T,) array
         Energies of the bodies that are present.
     dissipated : mapping from str to (T,) array
@@ -113,6 +118,7 @@ class Trajectory(Checked, Printed):
     every: int = 1
     t_end: float | None = None
     steps_per_second: float = math.nan
+    friction: FrictionTable = field(default_factory=FrictionTable)
 
     def __len__(self) -> int:
         """Return the number of recorded instants."""
@@ -120,7 +126,7 @@ class Trajectory(Checked, Printed):
 
     def __repr__(self) -> str:
         """Return what was recorded, in one line."""
-        count = self.rests.shape[1]
+        count = len(self.bodies)
         bodies = f"{count} {'body' if count == 1 else 'bodies'}"
         span = f"{self.times[0]:g} to {self.times[-1]:g} s in {len(self)} instants"
         return f"Trajectory({bodies}; {span}; {len(self.events)} events)"
@@ -128,7 +134,7 @@ class Trajectory(Checked, Printed):
     def __getitem__(self, kind: str) -> MotionOfKind:
         """Return the motion of the bodies of one kind, by its name."""
         bodies = self.system.bodies
-        names("kind", [kind], bodies.labels)
+        checks.names("kind", [kind], bodies.labels)
         start, end = bodies.starts[bodies.labels.index(kind) :][:2]
         q, v = (self._of(values, kind) for values in (self.q, self.v))
         return MotionOfKind(self.times, q, v, self.rests[:, start:end], self.present[:, start:end])
@@ -139,10 +145,11 @@ class Trajectory(Checked, Printed):
     @property
     def bodies(self) -> tuple[str, ...]:
         """What the bodies are called, in the order of their numbers."""
-        return tuple(map(self.system.bodies.name_of, range(self.rests.shape[1])))
+        bodies = self.system.bodies
+        return bodies.names or tuple(f"body {i}" for i in range(bodies.total))
 
     def _sheet(self) -> Sheet:
-        tables = (_energies(self), _events(self), *_last(self))
+        tables = (_energies(self), _events(self), _contacts(self), *_last(self))
         return Sheet("Trajectory", (facts(_summary(self)), *tables, ANGLES))
 
     @property
@@ -268,6 +275,44 @@ class Trajectory(Checked, Printed):
         return stratum_at(self.system.polyhedron, place, tolerance=tolerance)
 
     @checked
+    def contacts(self, when: float) -> list[ContactForce]:
+        """Return what touches at a recorded instant, with normal forces and friction.
+
+        Forces are means over the step before the instant, and at the start over the first step: a
+        contact that closes with an impact there has a large one.
+
+        Parameters
+        ----------
+        when : int or float
+            The number of the instant, or a time in s: then the last instant that is not after it.
+
+        Examples
+        --------
+        A block on a slope is held by friction:
+
+        >>> from polycorner import simulate
+        >>> from polycorner.bodies import Arrangement, HalfSpace, polygon
+        >>> block = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        >>> a = Arrangement({"block": block}, {"slope": HalfSpace([0, 1], [0, 0])})
+        >>> system = a.system(gravity=[2.0, -10.0], friction=0.5)
+        >>> path = simulate(system, system.state(a.point({"block": [0, 1]})), 0.1, 1e-2)
+        >>> for row in path.contacts(-1):
+        ...     print(row.contact, row.between, round(row.normal, 6), row.point.round(3))
+        block.v1-slope ('block', 'slope') 16.0 [-1.  0.]
+        block.v2-slope ('block', 'slope') 24.0 [1. 0.]
+        >>> sum(row.force for row in path.contacts(-1)).round(6).tolist()
+        [-8.0, 40.0]
+        """
+        index = self.at(float(when)) if isinstance(when, float) else int(when)
+        index = range(len(self))[index]
+        rubbed = self.friction.at(index, self.system.bodies.rubbing)
+        normal = {(bodies, name): force for bodies, name, force in self.touching[index]}
+        return [
+            _contact(self, index, *touch, normal.get(touch, math.nan), rubbed.get(touch, {}))
+            for touch in dict.fromkeys([*normal, *rubbed])
+        ]
+
+    @checked
     def at(self, time: float) -> int:
         """Return the index of the last recorded instant that is not after ``time``."""
         if not self.times[0] <= time <= self.times[-1]:
@@ -276,13 +321,59 @@ class Trajectory(Checked, Printed):
         return int(np.searchsorted(self.times, time, side="right")) - 1
 
 
+def contact_forces(path: Trajectory, when: float) -> ContactForces:
+    """Return the forces at an instant between bodies in space, as arrays for drawing.
+
+    Parameters
+    ----------
+    path : Trajectory
+        Of the system of an arrangement; contacts of other systems have no places, and are left out.
+    when : int or float
+        As for :meth:`Trajectory.contacts`.
+    """
+    checks.instance("path", path, Trajectory)
+    rows = [row for row in path.contacts(when) if row.point is not None]
+    d = len(rows[0].point) if rows and rows[0].point is not None else 0
+    points, directions, forces = (
+        np.array([getattr(row, name) for row in rows]).reshape(len(rows), d)
+        for name in ("point", "direction", "force")
+    )
+    torques = np.array([row.torque for row in rows], dtype=np.float64)
+    between = tuple((row.between[0], row.between[1]) for row in rows)
+    names = tuple(row.contact for row in rows)
+    return ContactForces(points, directions, forces, torques, between, names)
+
+
+def _contact(
+    path: Trajectory,
+    index: int,
+    bodies: tuple[int, ...],
+    contact: str,
+    normal: float,
+    friction: Mapping[str, tuple[float, ...]],
+) -> ContactForce:
+    scene = path.system.scene
+    between = () if scene is None else scene.parties(bodies, contact)
+    q = path.system.bodies.padded(path.q[index])
+    site = None if scene is None else scene.site(bodies, contact, q)
+    if site is None:
+        return ContactForce(bodies, contact, between, normal, friction)
+    slides = [np.array(p) for kind, p in friction.items() if kind != ROLLING]
+    force = normal * site.normal + sum(slides, np.zeros(len(site.tangents))) @ site.tangents
+    rolls = site.arm * np.array(friction.get(ROLLING, (0.0,) * len(site.tangents)))
+    torque = rolls[0] if len(rolls) == 1 else rolls @ site.tangents
+    told = site.point, site.normal, force, np.array(torque)
+    return ContactForce(bodies, contact, (site.one, site.two), normal, friction, *told)
+
+
 def _summary(path: Trajectory) -> Iterator[tuple[str, str]]:
-    effort, told = path.effort, []
-    for label, kind in zip_longest(path.system.bodies.labels, path.system.bodies.kinds):
+    effort, bodies, told = path.effort, path.system.bodies, []
+    for label, kind in zip_longest(bodies.labels, bodies.kinds):
         size, each = kind.dimension, " each" if kind.count > 1 else ""
-        many = f"{kind.count} {label}" if label else f"{kind.count}"
+        many = f"{kind.count} {label}" if label else f"{len(path.bodies)}"
         told.append(f"{many}, with {size} coordinate{'s' if size > 1 else ''}{each}")
-    yield "bodies", "; ".join(told)
+    known = f": {names(bodies.names)}" if bodies.total == 1 < len(bodies.names) else ""
+    yield "bodies", "; ".join(told) + known
     unfinished = "" if path.finished else f"; unfinished, {path.t_end:g} s were asked for"
     instants = f"in {len(path)} instants{unfinished}"
     yield "time", f"{path.times[0]:g} s to {path.times[-1]:g} s, {instants}"
@@ -293,7 +384,11 @@ def _summary(path: Trajectory) -> Iterator[tuple[str, str]]:
     yield "energy audit", f"{number(path.audit, 3)} of the energy that was moved"
     present = path.present[-1]
     at_rest = int((path.rests[-1] & present).sum())
-    yield "at the end", f"{int(present.sum())} present, {at_rest} of them at rest"
+    if bodies.total == 1 < len(path.bodies):  # in one dense system they rest or leave together
+        told = f"all {len(path.bodies)} at rest" if at_rest else "not at rest"
+        yield "at the end", told if present[0] else "none present"
+    else:
+        yield "at the end", f"{int(present.sum())} present, {at_rest} of them at rest"
 
 
 def _energies(path: Trajectory) -> Table:
@@ -313,6 +408,26 @@ def _events(path: Trajectory) -> Table:
     return Table(("event", "times"), rows, (1,))
 
 
+def _contacts(path: Trajectory) -> Table:
+    """Return what touches at last."""
+    touching = path.touching[-1]
+    rows = ((path, *touch) for touch in touching)
+    head = ("contact", "between", "normal force")
+    return listed("Contacts at last", head, starmap(_touch, rows), len(touching), (2,))
+
+
+def _touch(
+    path: Trajectory, bodies: tuple[int, ...], contact: str, force: float
+) -> tuple[str, str, str]:
+    scene = path.system.scene
+    between = () if scene is None else scene.parties(bodies, contact)
+    return (
+        contact,
+        " and ".join(between or map(path.system.bodies.called, bodies)),
+        number(force, 6),
+    )
+
+
 def _last(path: Trajectory) -> Iterator[Table]:
     bodies = path.system.bodies
     for label, kind, q in zip_longest(bodies.labels, bodies.kinds, bodies.split(path.q[-1])):
@@ -320,6 +435,10 @@ def _last(path: Trajectory) -> Iterator[Table]:
         if isinstance(path.system, System):
             titles = list(map(titled, titles, path.system.manifold.periods))
         first = 1 if label else 0
-        rows = ((str(i), *(number(x, 6) for x in at)) for i, at in enumerate(q, first))
+        called = kind.names if len(kind.names) == kind.count else ()
+        rows = (
+            (called[i] if called else str(i + first), *(number(x, 6) for x in at))
+            for i, at in enumerate(q)
+        )
         columns = tuple(range(len(titles) + 1))
         yield listed("Placement at last", (label or "body", *titles), rows, kind.count, columns)

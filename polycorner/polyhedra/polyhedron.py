@@ -20,11 +20,13 @@ from polycorner.formulas.bundles import Bundle
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.polyhedra.groups import AllOf, AnyOf, Part, collect
-from polycorner.printing import MOST_ROWS, Printed, Sheet, Table
+from polycorner.printing import MOST_ROWS, WIDTH, Printed, Sheet, Table, few
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value, cached_property
 
+LONGEST_LINE = 400  # characters of names that are shown in one line
+LONGEST_TREE = 1000  # characters of the tree in words
 LONGEST = 72  # characters of a formula beyond which only its coordinates are listed
 # A model's remark on a point.
 Annotation = Callable[[Array], str | None]
@@ -70,11 +72,11 @@ def description(
         The and/or tree in words; empty where all inequalities hold together.
     """
     return Sheet(
-        f"Polyhedron in {', '.join(_coordinates(manifold))}",
+        f"Polyhedron in {few(_coordinates(manifold), WIDTH)}",
         (
             _table(("inequality", "f >= 0"), functions),
             _table(("equation", "h = 0"), equations),
-            f"Joined as {joined}." if joined else "",
+            f"Joined as {checks.shortened(joined, LONGEST_TREE)}." if joined else "",
         ),
     )
 
@@ -98,7 +100,7 @@ def _table(head: tuple[str, str], functions: Sequence[SmoothFunction]) -> Table:
 def _formula(f: SmoothFunction) -> str:
     """Return a formula with the values of its parameters, or what it depends on if it is long."""
     definitions, expressions = f.family.formulas()
-    reads = ", ".join(f.manifold.names[i] for i in f.reads)
+    reads = few(f.manifold.names[i] for i in f.reads)
     if definitions or len(str(expressions[f.member_name])) > LONGEST:
         return f"a function of {reads}"
     values = zip(f.family.parameters, f.parameters, strict=True)
@@ -173,10 +175,15 @@ class Polyhedron(Printed, Value):
         self._sections = Bundle(manifold, self.equations)
 
     def __repr__(self) -> str:
-        """Return the coordinates and the names of the functions."""
+        """Return the coordinates and the names of the functions, or their numbers."""
         names = [h.name for h in self.stated]
         equations = f", equations {names}" if names else ""
-        return f"Polyhedron({list(self.manifold.names)}: {list(self.names)} >= 0{equations})"
+        told = f"{list(self.manifold.names)}: {list(self.names)} >= 0{equations}"
+        if len(told) > LONGEST_LINE:
+            several = f"; {len(names)} equations" if names else ""
+            coordinates = f"{self.manifold.size} coordinates: {few(self.manifold.names)}"
+            told = f"{coordinates}; {len(self.names)} functions: {few(self.names)}{several}"
+        return f"Polyhedron({told})"
 
     def _sheet(self) -> Sheet:
         joined = _words(self.tree, self.names)[1:-1] if self.is_union else ""

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import instance, real, reals, refuse
 from polycorner.kinds import checked
+from polycorner.printing import Printed, Sheet, few, listed, number
 from polycorner.spaces.arguments import (
     finite,
     given,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[np.float64]
+LONGEST = 300  # characters of arguments that are shown in one line
 
 
 class Geometry(Value):
@@ -129,7 +131,7 @@ class Geometry(Value):
 
 
 @dataclass(frozen=True)
-class Manifold(Geometry):
+class Manifold(Geometry, Printed):
     """The configuration manifold ``X``: a product of lines, circles, spheres and rotations.
 
     A point is one vector of length ``N`` (:attr:`size`).  Points of a sphere are unit vectors, and
@@ -194,10 +196,33 @@ class Manifold(Geometry):
         factors(names, self.spheres, self.rotations, periods, scales)
 
     def __repr__(self) -> str:
-        """Return the arguments that make it; spheres and rotations only where there are any."""
+        """Return the arguments that make it, or the coordinates where there are many."""
         shown = [f for f in fields(self) if getattr(self, f.name) != ()]
         arguments = ", ".join(f"{f.name}={getattr(self, f.name)!r}" for f in shown)
+        if len(arguments) > LONGEST:
+            return f"Manifold({self.size} coordinates: {few(self.names)})"
         return f"Manifold({arguments})"
+
+    def _sheet(self) -> Sheet:
+        unit = [name for f in self.factors for name in f.names]
+        rows = (
+            (
+                name,
+                "of a unit vector"
+                if name in unit
+                else f"circle of period {number(period, 6)}"
+                if math.isfinite(period)
+                else "line",
+                number(scale, 6),
+                measure,
+            )
+            for name, period, scale, measure in zip(
+                self.names, self.periods, self.scales, self.units, strict=True
+            )
+        )
+        dimension = f"Manifold of dimension {self.dimension}"
+        head = ("coordinate", "kind", "scale", "unit")
+        return Sheet(dimension, (listed("", head, rows, self.size, (2,)),))
 
     @classmethod
     def euclidean(

@@ -22,7 +22,19 @@ from polycorner import (
     minimise,
     prove,
 )
-from polycorner.bodies import Arrangement, Motor, Prescribed, Rail, box, disc
+from polycorner.bodies import (
+    Arrangement,
+    Mass,
+    Motor,
+    Prescribed,
+    Rail,
+    Robot,
+    RobotJoint,
+    RobotLink,
+    box,
+    disc,
+    sphere,
+)
 from polycorner.dumbbells.viewer import descent
 from polycorner.files import (
     load_certificate,
@@ -130,6 +142,13 @@ CASES = {
     "Motor.torque": ("torque", lambda e, _: Motor("J", e)),
     "Motor.speed": ("speed", lambda e, _: Motor("J", speed=e, limit=1.0)),
     "Prescribed.motion": ("motion", lambda e, _: Prescribed("J", e, limit=1.0)),
+    "Robot.system.torques": (
+        "torques",
+        lambda e, _: Robot(
+            {"a": RobotLink(), "b": RobotLink(sphere(0.1), Mass(1.0, [1, 0, 0], [1, 1, 1]))},
+            {"hinge": RobotJoint("a", "b", upper=1.0)},
+        ).system(torques={"hinge": e}),
+    ),
     "Arrangement.system.forces": (
         "forces",
         lambda e, _: Arrangement({"A": disc(1.0)}, WALLS).system(forces={"A": [e, 0.0]}),

@@ -141,9 +141,9 @@ def compiled_step(system, state, dt):
     engine.advance(1)
     motion = engine.motion
     rows = [len(f.slip) for f in system.friction]
-    friction = [p[:d].copy() for p, d in zip(motion.friction[0], rows, strict=True)]
-    after = State(engine.time, motion.q[0], motion.v[0], motion.sticks[0].astype(bool))
-    return after, motion.normal[0], friction
+    friction = [p[:d].copy() for p, d in zip(motion.friction, rows, strict=True)]
+    after = State(engine.time, motion.q[0], motion.v[0], motion.sticks.astype(bool))
+    return after, motion.normal, friction
 
 
 def solved(problem, turn):
@@ -373,13 +373,13 @@ def drum_solution(drum, engine, before):
     motion, known = engine.motion, int(before["counts"][0])
     flags = zip(before["keys"][:known], before["pair_flags"][:known, 0], strict=True)
     stuck = {CONTACTS[key % len(CONTACTS)]: bool(flag) for key, flag in flags}
-    states = before["q"], before["v"], engine.dt, before["sticks"], stuck
+    states = before["q"], before["v"], engine.dt, before["sticks"].reshape(-1, 3), stuck
     problem = drum_problem(drum, *states, engine.work.mid.kick.ravel())
     normal, rubs = np.zeros(len(CONTACTS)), np.zeros((len(CONTACTS), 2))
     count = int(motion.counts[0])
     for key, press in zip(motion.keys[:count], motion.pair_impulse[:count], strict=True):
         normal[key % len(CONTACTS)], rubs[key % len(CONTACTS)] = press[0], press[1:]
-    grips = [motion.friction[b, f, : (2, 2, 1)[f]] for b in (0, 1) for f in (0, 1, 2)]
+    grips = [motion.friction[3 * b + f, : (2, 2, 1)[f]] for b in (0, 1) for f in (0, 1, 2)]
     velocity, impulses = motion.v.ravel(), [*grips, *rubs]
     one = [Disc(drum.sliding[0]), Disc(drum.sliding[0]), Interval(drum.rolling[0])]
     static = [*one, *one, *[Disc(drum.rubbing[0])] * len(CONTACTS)]
@@ -473,6 +473,6 @@ def test_a_dyad_rests_where_the_inclusion_says_so():
     motion = engine.motion
     assert motion.rests.all()
     stuck = dict.fromkeys(CONTACTS, True)
-    problem = drum_problem(drum, motion.q, motion.v, engine.dt, motion.sticks, stuck)
+    problem = drum_problem(drum, motion.q, motion.v, engine.dt, motion.sticks.reshape(-1, 3), stuck)
     expected = solve_step(problem).velocity
     np.testing.assert_allclose(motion.v.ravel(), expected, atol=1e-9)

@@ -25,6 +25,7 @@ from polycorner import atomic as writing
 from polycorner.models.textbook import bouncing_ball
 from polycorner.motion import Checkpoint, Event, EventKind, Noise, Solver, simulate
 from polycorner.motion.checkpoints import KIND, STATE, SavedRun
+from polycorner.motion.scenes import FrictionTable
 from polycorner.motion.tables import event_table, read_events
 
 NOISE = Noise(kicks={"x": 0.3}, seed=5)
@@ -351,6 +352,7 @@ def recorder(rows):
         columns={"times": [0.1 * k for k in range(rows)]},
         left=[0.0] * rows,
         touching=[(((0,), "left", 1.5),)] * rows,
+        friction=[FrictionTable()] * rows,
         events=[read_events(event_table(happened, names), names, 1)],
         gone=0.25,
     )

@@ -535,7 +535,7 @@ def test_a_step_solves_the_inclusion_in_the_tangent_space(seed):
         solver=Solver(1e-11, refine=False),
     )
     engine.advance(1)
-    after, normal = engine.motion.v[0], engine.motion.normal[0]
+    after, normal = engine.motion.v[0], engine.motion.normal
     assert abs(system.polyhedron.equation_values(middle + dt * after)).max() < 1e-11
     base, tangent = np.linalg.pinv(rows) @ rows @ after, null_space(rows)
     problem = assemble(loose, state, dt, after)
@@ -555,7 +555,7 @@ def test_a_step_solves_the_inclusion_in_the_tangent_space(seed):
     expected = base + tangent @ solve_step(smaller).velocity
     assert after == pytest.approx(expected, abs=1e-8)
     impulse = np.vstack([problem.normals, rows]).T @ normal
-    for block, p in zip(problem.blocks, engine.motion.friction[0], strict=True):
+    for block, p in zip(problem.blocks, engine.motion.friction, strict=True):
         impulse += block.matrix.T @ p[: len(block.matrix)]
     assert problem.mass @ (after - problem.v_free) == pytest.approx(impulse, abs=1e-8)
 

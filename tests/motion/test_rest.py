@@ -47,10 +47,10 @@ def at_rest(name, steps, dt=1e-3):
 def imbalance(system, engine):
     """Sum of all forces on a system that rests, from the impulses of its last step."""
     motion, dt = engine.motion, engine.dt
-    state = State(engine.time, motion.q[0], motion.v[0], motion.sticks[0].astype(bool))
+    state = State(engine.time, motion.q[0], motion.v[0], motion.sticks.astype(bool))
     problem = assemble(system, state, dt)
-    total = problem.mass @ (problem.v_free - problem.v) + problem.normals.T @ motion.normal[0]
-    for block, p in zip(problem.blocks, motion.friction[0], strict=True):
+    total = problem.mass @ (problem.v_free - problem.v) + problem.normals.T @ motion.normal
+    for block, p in zip(problem.blocks, motion.friction, strict=True):
         total = total + block.matrix.T @ p[: len(block.matrix)]
     return total / dt
 
@@ -75,12 +75,12 @@ def test_forces_at_rest_balance(name):
     assert (motion.normal >= 0).all()
     for friction, p, owner, sources in zip(
         system.friction,
-        motion.friction[0] / engine.dt,
+        motion.friction / engine.dt,
         system.owners,
         system.load_sources,
         strict=True,
     ):
-        load = motion.normal[0, owner] / engine.dt if owner >= 0 else G * math.cos(STEEP)
+        load = motion.normal[owner] / engine.dt if owner >= 0 else G * math.cos(STEEP)
         assert bool(sources) == (owner < 0)
         assert friction.static.contains(p[: len(friction.slip)] / load, tolerance=1e-8)
 
@@ -90,7 +90,7 @@ def test_redundant_contacts_share_the_weight():
     force = {}
     for name in ("table", "stack", "pile"):
         system, _, engine = at_rest(name, 10)
-        force[name] = dict(zip(system.contacts, engine.motion.normal[0] / engine.dt, strict=True))
+        force[name] = dict(zip(system.contacts, engine.motion.normal / engine.dt, strict=True))
         normals = system.polyhedron.bundle.evaluate(engine.motion.q[0], 1)[1]
         assert np.linalg.matrix_rank(normals) <= len(system.contacts)
     table, stack, pile = force.values()

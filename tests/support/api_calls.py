@@ -67,6 +67,8 @@ VALUES = {
     "Condition": lambda: minimisation.Condition("holds", True, 0.5),
     "Contact": lambda: of.skeleton().contacts["left"],
     "ContactFamily": of.contact_family,
+    "ContactForce": lambda: of.trajectory().contacts(0)[0],
+    "ContactForces": lambda: motion.contact_forces(of.trajectory(), 0),
     "ConvexPolygon": lambda: motion.ConvexPolygon([[-1, -1], [1, -1], [1, 1], [-1, 1]]),
     "Corner": lambda: of.skeleton().corners[0],
     "CornerList": of.corner_list,
@@ -147,6 +149,9 @@ VALUES = {
     "SweepError": lambda: sweeps.SweepError("it stopped"),
     "Symmetry": of.symmetry,
     "MeshOptions": files.MeshOptions,
+    "Robot": of.arm,
+    "RobotJoint": lambda: of.arm().joints["hinge"],
+    "RobotLink": lambda: of.arm().links["rod"],
     "Solid": lambda: files.read_mesh(of.mesh_file()),
     "System": of.system,
     "TorusDisks": of.disks,
@@ -187,7 +192,7 @@ ALIKE = (  # arguments, and what takes them
     (
         {},
         """Arrangement.system Body.moved Certificate.explain Certificate.holds CornerList.skeleton
-        JammedPacking.near_gaps Manifold.matrix Manifold.vector Nerve.betti
+        Robot.system JammedPacking.near_gaps Manifold.matrix Manifold.vector Nerve.betti
         Nerve.euler_characteristic PeriodicPacking.scattered StationaryList.certificates
         TorusDisks.critical_search Trajectory.to_xarray Tutorial.sides""",
     ),
@@ -309,6 +314,7 @@ CALLS = {
     "motion.angular_velocity": lambda: {"manifold": polycorner.Manifold.rotation("a")},
     "motion.motions": lambda: {"manifold": of.M},
     "motion.pair_coordinates": lambda: {"manifold": of.M},
+    "motion.contact_forces": lambda: {"path": of.trajectory(), "when": 0},
     "motion.pair_velocities": lambda: {"manifold": of.M},
     "motion.random_field": lambda: {
         "x": of.X,
@@ -350,6 +356,7 @@ CALLS = {
     "System.largest_step": lambda: {"state": of.state()},
     "System.sticks": lambda: {"q": of.state().q, "v": of.state().v},
     "Trajectory.at": lambda: {"time": 0.005},
+    "Trajectory.contacts": lambda: {"when": 0},
     "Trajectory.of_kind": lambda: {"kind": motion.EventKind.IMPACT},
     "Trajectory.stratum": lambda: {"index": 0},
     # bodies
@@ -367,6 +374,11 @@ CALLS = {
     "Arrangement.joint_function": lambda: {"name": "rail"},
     "Arrangement.joint_rate": lambda: {"name": "rail"},
     "Arrangement.joint_values": lambda: {"q": [0.0, 0.0, 3.0, 0.0]},
+    "Robot.overlapping": lambda: {"q": [0.1]},
+    "Robot.placed": lambda: {"q": [0.1]},
+    "Robot.point": lambda: {"placed": {"hinge": 0.1}},
+    "Robot.pose": lambda: {"q": [0.1], "link": "rod"},
+    "RobotJoint.driven_by": lambda: {"name": "hinge"},
     "Arrangement.placed": lambda: {"q": [0.0, 0.0, 3.0, 0.0]},
     "Arrangement.point": lambda: {"placed": {"a": [0.0, 0.0], "b": [3.0, 0.0]}},
     "Arrangement.velocity": lambda: {"q": [0.0, 0.0, 3.0, 0.0], "moving": {"a": [1.0, 0.0]}},

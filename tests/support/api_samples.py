@@ -181,6 +181,15 @@ def problem_file():
 
 
 @cache
+def arm():
+    rod = bodies.RobotLink(
+        bodies.capsule([0, 0, 0], [1, 0, 0], 0.1), bodies.Mass(1.0, [0.5, 0, 0], [0.01, 0.1, 0.1])
+    )
+    hinge = bodies.RobotJoint("base", "rod", lower=-1.0, upper=1.0)
+    return bodies.Robot({"base": bodies.RobotLink(), "rod": rod}, {"hinge": hinge})
+
+
+@cache
 def mesh_file():
     path = new("corner.obj")
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")

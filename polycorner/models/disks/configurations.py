@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from polycorner.models.disks.critical_points import judged
 from polycorner.models.disks.torus import IMAGES, Pairs, components, translates, uncut
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
@@ -51,7 +52,7 @@ class Disks(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class CriticalConfiguration(Checked):
+class CriticalConfiguration(Checked, Described):
     """A configuration at which the largest common radius is critical.
 
     Attributes

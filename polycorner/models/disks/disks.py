@@ -20,6 +20,7 @@ from polycorner.models.disks.critical import CriticalSearch
 from polycorner.models.disks.torus import IMAGES, OWN, Pairs, bound, gap, wrapped
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.printing import Described
 from polycorner.progress import Progress
 from polycorner.spaces.arguments import scalar
 from polycorner.spaces.manifold import Array, Manifold
@@ -32,7 +33,7 @@ COSINES = {"square": 0.0, "hexagonal": 0.5}
 
 
 @dataclass(frozen=True)
-class TorusDisks(Checked):
+class TorusDisks(Checked, Described):
     """``n`` equal disks on the torus ``R^2/L``.
 
     ::

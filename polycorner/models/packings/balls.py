@@ -27,6 +27,7 @@ from polycorner.models.packings.regions import (
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
@@ -34,7 +35,7 @@ HOLES = 10  # random points a body, among which holes are looked for
 WIDER = 4  # power of the width with which a hole is chosen
 
 
-class Balls(Checked):
+class Balls(Checked, Described):
     """Balls in a region, which do not overlap and are to be large."""
 
     count: int

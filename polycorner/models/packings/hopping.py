@@ -26,6 +26,7 @@ from polycorner.minimisation.certificate import Certificate, certify
 from polycorner.minimisation.methods import minimise
 from polycorner.minimisation.sparse.programmes import Linearised, step
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.printing import Described
 from polycorner.progress import Progress, silent
 from polycorner.searches import Clock, Ending, Task, work_through
 from polycorner.spaces.manifold import Array
@@ -64,7 +65,7 @@ class Hopped(Protocol):
 
 
 @dataclass(frozen=True)
-class BasinHopping(Checked):
+class BasinHopping(Checked, Described):
     """What basin hopping has found.
 
     Attributes

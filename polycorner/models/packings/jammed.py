@@ -12,6 +12,7 @@ from polycorner.minimisation.certificate import Certificate, certify
 from polycorner.minimisation.verdicts import Verdict
 from polycorner.models.packings.contacts import gaps_polyhedron, neighbours
 from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, cached_property
 
@@ -47,7 +48,7 @@ class PackingResiduals:
 
 
 @dataclass(frozen=True, eq=False)
-class JammedPacking(Checked):
+class JammedPacking(Checked, Described):
     """A packing at a maximum of the inflation, with its contacts and forces.
 
     Attributes

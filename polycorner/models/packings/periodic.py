@@ -15,6 +15,7 @@ from polycorner.kinds import checked
 from polycorner.minimisation.sparse.chain import ChainEnd, ChainEnergy, descend
 from polycorner.models.packings.contacts import neighbours, rows_of
 from polycorner.models.packings.jammed import JammedPacking
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked
 
@@ -139,7 +140,7 @@ def largest_inflation(centres: Array, radii: Array, box: float, guess: float) ->
 
 
 @dataclass(frozen=True, eq=False)
-class PeriodicPacking(Checked):
+class PeriodicPacking(Checked, Described):
     """Discs (``d = 2``) or spheres (``d = 3``) in a periodic square or cube.
 
     Their radii are ``s radii``, and the inflation ``s`` is to be as large as possible while no two
@@ -170,6 +171,11 @@ class PeriodicPacking(Checked):
     radii: Array
     dimension: int = 2
     box: float = 1.0
+
+    def __repr__(self) -> str:
+        """Return the number of bodies, in one line."""
+        count, d = len(self.radii), self.dimension
+        return f"PeriodicPacking({count} bodies in {d} dimensions, box {self.box:g})"
 
     def __post_init__(self) -> None:
         expected = "at least two positive numbers"

@@ -16,6 +16,7 @@ from polycorner.models.packings.regions import family, symbols
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
@@ -27,7 +28,7 @@ SHAKES = (0.05, 0.2, 0.5, 1.0)  # of all points, in mean distances
 
 
 @dataclass(frozen=True)
-class PointsOnSphere(Checked):
+class PointsOnSphere(Checked, Described):
     """``n`` points of the unit sphere, as unit vectors ``(x_i, y_i, z_i)``.
 
     ============  ==============================================================================

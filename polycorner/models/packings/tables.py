@@ -11,6 +11,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.kinds import checked
+from polycorner.printing import Described
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, cached_property
 
@@ -21,7 +22,7 @@ Rows = tuple[tuple[Fraction, ...], ...]
 
 
 @dataclass(frozen=True)
-class CoordinateTable(Checked):
+class CoordinateTable(Checked, Described):
     """Numbers of a table, as they are written.
 
     Attributes

@@ -191,7 +191,7 @@ class Engine:
             body, names = kind.body, kind.body.formulation.coordinates
             parameters = self._parameters(int(bodies.kind_of[i]))
             q, v = motion.q[i, : len(names)], motion.v[i, : len(names)]
-            which = f" of {bodies.name_of(i)}" if bodies.total > 1 else ""
+            which = f" of {bodies.called(i)}" if bodies.total > 1 else ""
             state = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, q, strict=True))
             where = f"{which} at t = {self.time:.6g}, {state}"
             middle = q + 0.5 * self.dt * v
@@ -276,6 +276,13 @@ class Engine:
         return own + [
             (two, names[c], force) for two, c, force in zip(bodies, which, forces, strict=True)
         ]
+
+    def pair_of(self, s: int) -> tuple[tuple[int, int], int]:
+        """Return the two bodies of a contact in the list, the lower number first, and the gap."""
+        pair, g = divmod(int(self.motion.keys[s]), max(1, self.model.most_pair_gaps))
+        ranks = np.array(divmod(pair, self.bodies.total))
+        i, j = sorted(self.motion.body_of_rank[ranks].tolist())
+        return (i, j), g
 
     def _between(
         self, i: NDArray[np.int64], j: NDArray[np.int64], gaps: NDArray[np.int64]

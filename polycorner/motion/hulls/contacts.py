@@ -183,17 +183,18 @@ class HullContacts(Value):
             "reach": self.reach,
         }
 
-    def compiled(self, manifold: Manifold) -> PairContacts:
-        """Return the compiled contacts of bodies whose coordinates are those of a manifold."""
-        table, names, n = self.table, self.names, manifold.size
+    def compiled(self, manifold: Manifold, other: Manifold | None = None) -> PairContacts:
+        """Return the compiled contacts of bodies with coordinates on a manifold, or on two."""
+        table, names, both = self.table, self.names, (manifold, other or manifold)
+        n = sum(one.size for one in both)
         digest = hashlib.sha256(np.array(table).tobytes()).hexdigest()
-        variables = tuple(f"{name}{k}" for k in (1, 2) for name in manifold.names)
-        kernel = HullKernel(f"hulls {digest}", ("values", "gradients"), 2 * n, len(names))
+        variables = tuple(f"{x}{k}" for k, one in enumerate(both, 1) for x in one.names)
+        kernel = HullKernel(f"hulls {digest}", ("values", "gradients"), n, len(names))
         gaps = HullFamily(names, variables, kernel.key, kernel)
         slips = ()
         if self.laws:
             rows = tuple(f"s{i}" for i in range(self.dimension - 1))
-            slip = HullKernel("slips of hulls", ("slips", "slips"), 4 * n, len(rows))
+            slip = HullKernel("slips of hulls", ("slips", "slips"), 2 * n, len(rows))
             family = HullFamily(
                 rows, (*variables, *(f"{x}_dot" for x in variables)), slip.key, slip
             )
@@ -205,7 +206,7 @@ class HullContacts(Value):
         return PairContacts(
             gaps,  # type: ignore[arg-type]  # what is asked of a family, it has
             tuple(table),
-            tuple((body, c) for body in range(2) for c in range(n)),
+            tuple((body, c) for body, one in enumerate(both) for c in range(one.size)),
             slips,  # type: ignore[arg-type]
             self.laws,
             self.restitution,

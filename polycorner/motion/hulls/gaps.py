@@ -7,12 +7,12 @@ The *gap* of a vertex is its greatest height over the faces of the other part: n
 outside a bound of the distance that vanishes with it.  That of two edges is the distance of the
 points where they cross, seen along the normal of the plane between the parts, or by how much they
 miss each other there, if that is more.  So gaps are continuous as long as the plane is the same,
-and none is small where nothing touches.  What is beside a face, or misses an edge, by no more than a
-rounding error counts as over it: where corners lie on corners, as in a stack, load does not pass
-from one to the other with every shift by such an error.  All close and slip along the one plane
-between the parts (:mod:`~polycorner.motion.hulls.planes`), at the point of the vertex or edge.
-Where parts overlap the contact of the plane itself, a face and the vertex that is deepest or two edges, has the height
-of the plane, so that no overlap is without a contact.
+and none is small where nothing touches.  What is beside a face, or misses an edge, by no more than
+is a plane through both, counts as over it: where corners lie on corners, as in a stack, load does
+not pass from one to the other with every shift by a rounding error.  All close and slip along the
+one plane between the parts (:mod:`~polycorner.motion.hulls.planes`), at the point of the vertex or
+edge.  Where parts overlap and no gap says so, the contact of the plane itself, a face and the
+vertex that is deepest or two edges, has the height of the plane.
 
 Rows: in the plane, velocities that keep both ends of the overlap of two parallel faces from closing
 keep all of it from closing, since the velocity along the normal is affine on it.  In space the
@@ -113,10 +113,12 @@ def edge_gap(table, p, u, q, v, normal):
         return np.inf, 0.0
     s, t = dot(cross(r, v), normal) / size, dot(cross(r, u), normal) / size
     missed = abs(size) * max(max(-s, s - 1.0) / np.sqrt(vv), max(-t, t - 1.0) / np.sqrt(uu))
-    apart = dot(r, w) / size
+    # Of nearly parallel edges lines cross far away: heights are those of points of the edges.
+    s, t = min(max(s, 0.0), 1.0), min(max(t, 0.0), 1.0)
+    apart = dot(normal, beyond(beyond(r, t, v), -s, u))
     if missed > get(table, THROUGH):
         apart = max(apart, missed)
-    return apart, min(max(s, 0.0), 1.0)
+    return apart, s
 
 
 @compiled

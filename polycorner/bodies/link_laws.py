@@ -1,0 +1,87 @@
+"""Energies, forces and friction of links, as formulas of joint coordinates and velocities."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from polycorner.bodies.chains import Moving, clean, crossed, dot, times, transposed
+from polycorner.bodies.links import RobotJoint
+from polycorner.bodies.masses import Mass
+from polycorner.bodies.rigid_motions import number, spin
+from polycorner.bodies.walls import HalfSpace
+from polycorner.formulas.expressions import as_expression
+from polycorner.motion.contacts import Friction
+from polycorner.motion.friction import Interval
+from polycorner.spaces.manifold import Array
+
+if TYPE_CHECKING:
+    import sympy
+
+
+Rates = Mapping[str, "sympy.Symbol"]
+
+
+def forces(
+    joints: Mapping[str, RobotJoint], rates: Rates, torques: "Mapping[str, sympy.Expr]"
+) -> "dict[str, sympy.Expr]":
+    """Return the forces of damping and of drives, which reach as far as the effort of the joint."""
+    import sympy
+
+    found: dict[str, sympy.Expr] = {}
+    for name, joint in joints.items():
+        if not joint.moves:
+            continue
+        other, rate, _ = joint.driven_by(name)
+        force = -number(joint.damping * rate**2) * rates[other]
+        if name in torques:
+            drive = as_expression(f"torques[{name!r}]", torques[name])
+            if math.isfinite(joint.effort):
+                most = number(joint.effort)
+                drive = sympy.Max(-most, sympy.Min(most, drive))
+            force += drive
+        if force != 0:
+            found[other] = found.get(other, sympy.S.Zero) + force
+    return found
+
+
+def joint_friction(joints: Mapping[str, RobotJoint], rates: Rates) -> Iterator[Friction]:
+    """Yield the dry friction of joints."""
+    import sympy
+
+    for name, joint in joints.items():
+        if joint.moves and joint.friction:
+            other, rate, _ = joint.driven_by(name)
+            load = sympy.S.One * number(joint.friction * abs(rate))
+            yield Friction(f"{name} rubs", (rates[other] * sympy.S.One,), Interval(1.0), (load,))
+
+
+def slips(motion: Moving, point: Array, radius: float, wall: HalfSpace) -> "tuple[sympy.Expr, ...]":
+    """Return the slip at a wall of the point that is ``radius`` below a point of a link."""
+    normal = [number(x) for x in wall.normal.tolist()]
+    inward, r = times(transposed(motion.matrix), normal), number(radius)
+    arm = [number(x) - r * n for x, n in zip(point.tolist(), inward, strict=True)]
+    speed = [a + b for a, b in zip(motion.velocity, crossed(motion.spin, arm), strict=True)]
+    moving, tangents = times(motion.matrix, speed), np.linalg.svd(wall.normal[None])[2][1:]
+    return tuple(dot([*map(number, row)], moving) for row in clean(tangents).tolist())
+
+
+def joined(masses: Sequence[Mass]) -> Mass:
+    """Return the mass of several as one."""
+    total = math.fsum(m.mass for m in masses)
+    centre = np.sum([m.mass * m.centre for m in masses], axis=0) / total
+    inertia = np.zeros((3, 3))
+    for m in masses:
+        across = spin(m.centre - centre, 3)
+        inertia += m.inertia + m.mass * across @ across.T
+    return Mass(total, centre, inertia)
+
+
+def kinetic(motion: Moving, mass: Mass) -> "sympy.Expr":
+    """Return the kinetic energy of a mass that moves with a link."""
+    centre, omega = [number(x) for x in clean(mass.centre).tolist()], motion.spin
+    speed = [v + w for v, w in zip(motion.velocity, crossed(omega, centre), strict=True)]
+    inertia = [[number(x) for x in row] for row in mass.inertia.tolist()]
+    turning = dot(omega, times(inertia, omega))
+    return (number(mass.mass) * sum(v**2 for v in speed) + turning) / 2

@@ -1,0 +1,541 @@
+"""Robots: links that joints hold together in open chains, in the coordinates of the joints."""
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from itertools import combinations
+from operator import mul
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from polycorner import checks
+from polycorner.bodies import link_laws
+from polycorner.bodies.arrangement import check_together, coordinates
+from polycorner.bodies.chains import (
+    Moving,
+    Pose,
+    dot,
+    moved,
+    still,
+)
+from polycorner.bodies.dynamics import smooth
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.kernels import together
+from polycorner.bodies.link_trees import WORLD, LinkTree
+from polycorner.bodies.links import RobotJoint, RobotLink
+from polycorner.bodies.masses import Mass, mass_of
+from polycorner.bodies.pairs import PlacedPart, Tree, apart
+from polycorner.bodies.poses import Placement, frame_of
+from polycorner.bodies.rigid_motions import number
+from polycorner.bodies.shapes import Body, Part
+from polycorner.bodies.walls import HalfSpace, Wall, within
+from polycorner.checks import refuse
+from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
+from polycorner.kinds import checked
+from polycorner.motion.contacts import Friction, velocities
+from polycorner.motion.friction import Disc
+from polycorner.motion.system import System
+from polycorner.polyhedra.groups import AllOf, AnyOf
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import Checked, cached_property
+
+if TYPE_CHECKING:
+    import sympy
+
+MOST_GAPS = 20_000
+
+
+class _Carried(NamedTuple):
+    """A part in the axes of its carrier, and the link that may touch what is not next to it."""
+
+    link: str
+    name: str
+    part: Part
+    carrier: str
+    is_linked: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Robot(Checked):
+    """Links held together by joints in an open chain or tree, and what stands around them.
+
+    Coordinates are the joints, an angle or a length each, by the name of the joint; a joint that
+    follows another has none.  Before them are those of the base, if it floats: ``x y z`` and a
+    quaternion, with its name; after them those of bodies that move freely, as in
+    :class:`~polycorner.bodies.Arrangement`.  Contacts are called as there; ``elbow lower`` and
+    ``elbow upper`` are limits.
+
+    Links that share a joint do not touch each other, and neither do those that fixed joints hold
+    together.
+
+    Parameters
+    ----------
+    links : mapping from str to RobotLink
+    joints : mapping from str to RobotJoint
+        Each link but one, the base, is the child of one joint.
+    base : {"fixed", "floating"}, optional
+        Whether the base stands at the origin (default) or moves freely.
+    walls : mapping from str to HalfSpace or Cylinder, optional
+        The base of a fixed robot does not touch them.
+    fixed, bodies : mapping from str to Body, optional
+        What stands in space, and what moves freely.
+    ignored : sequence of (str, str), optional
+        Pairs of links, or of a link and something else, that do not touch each other.
+    unit : str, optional
+        Unit of length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from polycorner.bodies import HalfSpace, Mass, Robot, RobotJoint, RobotLink, capsule
+    >>> rod = RobotLink(
+    ...     capsule([0, 0, 0], [1, 0, 0], 0.1), Mass(1.0, [0.5, 0, 0], [1e-3, 0.1, 0.1])
+    ... )
+    >>> arm = Robot(
+    ...     {"base": RobotLink(), "upper": rod, "lower": rod},
+    ...     {
+    ...         "shoulder": RobotJoint("base", "upper", axis=[0, 1, 0], lower=-2, upper=2),
+    ...         "elbow": RobotJoint("upper", "lower", origin=[1, 0, 0], axis=[0, 1, 0], upper=2.5),
+    ...     },
+    ...     walls={"floor": HalfSpace([0, 0, 1], [0, 0, -0.5])},
+    ... )
+    >>> arm.manifold.names, arm.polyhedron.names
+    (('shoulder', 'elbow'),
+     ('upper.v1-floor', 'upper.v2-floor', 'lower.v1-floor', 'lower.v2-floor',
+      'shoulder lower', 'shoulder upper', 'elbow upper'))
+    >>> arm.placed(arm.point({"shoulder": np.pi / 2}))["lower"].markers.round(9)[:, 2].tolist()
+    [-1.0, -2.0]
+    """
+
+    links: Mapping[str, RobotLink]
+    joints: Mapping[str, RobotJoint]
+    base: Literal["fixed", "floating"] = "fixed"
+    walls: Mapping[str, Wall] = field(default_factory=dict)
+    fixed: Mapping[str, Body] = field(default_factory=dict)
+    bodies: Mapping[str, Body] = field(default_factory=dict)
+    ignored: Sequence[tuple[str, str]] = ()
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        for argument in ("links", "joints", "walls", "fixed", "bodies"):
+            object.__setattr__(self, argument, dict(checks.mapping(argument, vars(self)[argument])))
+        checks.choice("base", self.base, ("fixed", "floating"))
+        if not self.links:
+            refuse("links", "at least one link", self.links)
+        named = {"links": RobotLink, "joints": RobotJoint, "fixed": Body, "bodies": Body}
+        for argument, kind in named.items():
+            for name, value in vars(self)[argument].items():
+                checks.instance(f"{argument}: {name}", value, kind)
+                if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
+                    refuse(argument, "names of letters, digits and _", name)
+        known = {
+            n: link.body or Body({"": Part(np.zeros((1, 3)), 1.0)})
+            for n, link in self.links.items()
+        }
+        check_together({**known, **self.bodies}, dict(self.fixed), dict(self.walls))
+        if twice := set(self.links) & set(self.bodies):
+            refuse("bodies", "names that no link has", min(twice))
+        self._tree.check()
+        names = {*known, *self.bodies, *self.fixed, *self.walls}
+        for pair in self.ignored:
+            if len(pair) != 2:
+                refuse("ignored", "pairs of names", pair)
+            checks.names("ignored", pair, names)
+        object.__setattr__(self, "ignored", tuple(map(tuple, self.ignored)))
+        super().__post_init__()
+
+    @cached_property
+    def _tree(self) -> LinkTree:
+        loose = {name: _frame(body) for name, body in self.bodies.items()}
+        return LinkTree(tuple(self.links), self.joints, self.base == "floating", loose)
+
+    @property
+    def root(self) -> str:
+        """The base link."""
+        return self._tree.root
+
+    @cached_property
+    def _carried(self) -> list[_Carried]:
+        """All parts in the axes of their carriers."""
+        found: list[_Carried] = []
+        for name, link in self.links.items():
+            carrier, matrix, origin = self._tree.rests[name]
+            if link.body is not None:
+                found += _parts(name, link.body.carried(origin, matrix), carrier, is_linked=True)
+        for name, body in self.fixed.items():
+            found += _parts(name, body, WORLD, is_linked=False)
+        for name, body in self.bodies.items():
+            found += _parts(name, body, name, is_linked=False)
+        return found
+
+    # --------------------------------------------------------------------------------- the space
+
+    @property
+    def dimension(self) -> int:
+        """The dimension of space, 3."""
+        return 3
+
+    @cached_property
+    def scale(self) -> float:
+        """The displacement that counts as a unit: half the thickness of the thinnest part."""
+        return min((part.part.thickness for part in self._carried), default=1.0)
+
+    @cached_property
+    def _placements(self) -> tuple[Placement, ...]:
+        """The coordinates of the base, if it floats, and of free bodies."""
+        found: list[Placement] = []
+        start = 0
+        whole = {self.root: None} if self.base == "floating" else {}
+        for name, body in [*whole.items(), *self.bodies.items()]:
+            kind = Frame.ROTATED if body is None else _frame(body)
+            sized = Body({"": Part(np.zeros((1, 3)), 1.0)}) if body is None else body
+            turn = self.scale / max(sized.size, self.scale)
+            factor = kind.manifold(name, 3, self.scale, turn, self.unit)
+            start += len(self._tree.free) if body is not None and len(found) == len(whole) else 0
+            found.append(Placement(name, sized, kind, factor, slice(start, start + factor.size)))
+            start += factor.size
+        return tuple(found)
+
+    @cached_property
+    def manifold(self) -> Manifold:
+        """The placements of all links and bodies."""
+        joints = []
+        for name in self._tree.free:
+            joint = self.joints[name]
+            if joint.kind == "prismatic":
+                joints.append(Manifold((name,), (math.inf,), (self.scale,), (self.unit,)))
+            else:
+                period = math.tau if joint.kind == "continuous" else math.inf
+                turn = self.scale / max(self._reach(joint.child), self.scale)
+                joints.append(Manifold((name,), (period,), (turn,), ("rad",)))
+        own = [p.manifold for p in self._placements]
+        floats = int(self.base == "floating")
+        factors = [*own[:floats], *joints, *own[floats:]]
+        if not factors:
+            refuse("joints", "a joint that moves", self.joints)
+        return reduce(mul, factors)
+
+    def _reach(self, link: str) -> float:
+        """Return how far the parts beyond a joint reach from it, at most."""
+        own = self.links[link].body
+        below = [
+            float(np.linalg.norm(joint.origin)) + self._reach(joint.child)
+            for joint in self.joints.values()
+            if joint.parent == link
+        ]
+        return max([0.0 if own is None else own.size, *below])
+
+    @cached_property
+    def home(self) -> Array:
+        """All joints at zero, or at the limit next to it, and free bodies at the origin."""
+        return self.point({})
+
+    def _joined(self, placed: Mapping[str, Any], angles: Mapping[str, float]) -> Array:
+        """Return a point of placements of free bodies and values of joints."""
+        values: dict[str, float] = {}
+        for p in self._placements:
+            own = coordinates({p.name: placed.get(p.name, np.zeros(3))}, [p])
+            values |= dict(zip(p.manifold.names, own.tolist(), strict=True))
+        for name in self._tree.free:
+            joint = self.joints[name]
+            values[name] = angles.get(name, min(max(0.0, joint.lower), joint.upper))
+        return np.array([values[name] for name in self.manifold.names])
+
+    @checked
+    def point(self, placed: Mapping[str, Any]) -> Array:
+        """Return the point of given angles, lengths and placements, ``(N,)``.
+
+        Parameters
+        ----------
+        placed : mapping from str to float or placement
+            Values of joints; the others are zero, or at the limit next to it.  Of free bodies, and
+            the base if it floats, as for :meth:`Arrangement.point`; by default at the origin.
+        """
+        free = [p.name for p in self._placements]
+        checks.names("placed", placed, [*self._tree.free, *free])
+        angles = {n: checks.real("placed", x) for n, x in placed.items() if n not in free}
+        return self._joined({n: x for n, x in placed.items() if n in free}, angles)
+
+    def _poses(self, q: ArrayLike) -> dict[str, Pose]:
+        """Return where the carriers are."""
+        point = self.manifold.point(q).tolist()
+        return self._tree.poses(dict(zip(self.manifold.names, point, strict=True)))
+
+    def pose(self, q: ArrayLike, link: str) -> Pose:
+        """Return the matrix ``(3, 3)`` and the origin ``(3,)`` of a link at a point."""
+        checks.names("link", [link], self.links)
+        carrier, matrix, origin = self._tree.rests[link]
+        turned, at = self._poses(q)[carrier]
+        return turned @ matrix, at + turned @ origin
+
+    def placed(self, q: ArrayLike) -> dict[str, Body]:
+        """Return the links that have bodies, free and fixed bodies where they are at a point."""
+        poses, found = self._poses(q), {}
+        for name, link in self.links.items():
+            if link.body is not None:
+                carrier, matrix, origin = self._tree.rests[name]
+                turned, at = poses[carrier]
+                found[name] = link.body.carried(at + turned @ origin, turned @ matrix)
+        found |= {n: b.carried(poses[n][1], poses[n][0]) for n, b in self.bodies.items()}
+        return {**found, **self.fixed}
+
+    # ---------------------------------------------------------------------------------- contacts
+
+    @cached_property
+    def polyhedron(self) -> Polyhedron:
+        """``D``, the placements without overlap and within the limits."""
+        return Polyhedron(self.manifold, AllOf(*self._contacts(excluded=True)))
+
+    def _contacts(self, *, excluded: bool) -> list[Tree]:
+        pairs = [*self._pairs()]
+        size = sum(_size(one.part, two.part) for one, two in pairs)
+        if size > MOST_GAPS:
+            one, two = max(pairs, key=lambda pair: _size(pair[0].part, pair[1].part))
+            msg = (
+                f"links: expected parts with at most {MOST_GAPS} gaps, of vertices, edges and "
+                f"faces; got {size}, of which {one.name!r} and {two.name!r} have "
+                f"{_size(one.part, two.part)}; capsules have one each"
+            )
+            raise ValueError(msg)
+        found: list[Tree] = [
+            apart(
+                self.manifold,
+                self._linked(one, two.carrier),
+                self._linked(two, None),
+                excluded=excluded,
+            )
+            for one, two in pairs
+        ]
+        found += [function for _, function, *_ in self._at_walls]
+        found = [*together(found), *self._limits]
+        if not found:
+            refuse("links", "something that links can touch, or limits of joints", [*self.links])
+        return found
+
+    def _linked(self, one: _Carried, start: str | None) -> PlacedPart:
+        """Return a part as it is placed from a carrier, or in its own."""
+        chain = None if start is None else self._tree.chain(start, one.carrier)
+        frame = Frame.FIXED if chain is None else Frame.LINKED
+        return PlacedPart(one.link, one.name, one.part, frame, None, (), np.zeros(3), chain=chain)
+
+    def _pairs(self) -> Iterator[tuple[_Carried, _Carried]]:
+        """Yield the parts that can touch; the first is one that moves."""
+        ignored = {frozenset(pair) for pair in self.ignored}
+        for one, two in combinations(self._carried, 2):
+            if one.carrier == two.carrier or frozenset((one.link, two.link)) in ignored:
+                continue
+            before = {c: self._tree.steps[c][0] if c else None for c in (one.carrier, two.carrier)}
+            if (
+                one.is_linked
+                and two.is_linked
+                and (before[one.carrier] == two.carrier or before[two.carrier] == one.carrier)
+            ):
+                continue
+            yield (one, two) if one.carrier else (two, one)  # what stands in space is the second
+
+    @cached_property
+    def _at_walls(self) -> list[tuple[str, SmoothFunction, _Carried, Array]]:
+        """The gaps at walls with their walls, parts and points."""
+        ignored = {frozenset(pair) for pair in self.ignored}
+        return [
+            (name, function, one, point)
+            for name, wall in self.walls.items()
+            for one in self._carried
+            if one.carrier != WORLD and frozenset((one.link, name)) not in ignored
+            for function, point in within(self.manifold, name, wall, self._linked(one, WORLD))
+        ]
+
+    @cached_property
+    def _limits(self) -> list[SmoothFunction]:
+        """How far the joints are from their limits."""
+        found = []
+        for name, joint in self.joints.items():
+            other, rate, offset = joint.driven_by(name)
+            for sign, limit, word in ((1, joint.lower, "lower"), (-1, joint.upper, "upper")):
+                if joint.moves and math.isfinite(limit):
+                    numbers = sign * rate, sign * (offset - limit)
+                    function = SmoothFunction.member(
+                        _affine(),
+                        "gap",
+                        self.manifold,
+                        parameters=numbers,
+                        reads=(other,),
+                        label=f"{name} {word}",
+                    )
+                    found.append(function)
+        return found
+
+    @checked
+    def overlapping(self, q: ArrayLike) -> list[tuple[str, str]]:
+        """Return the pairs of links, or of a link and something else, that overlap at a point."""
+        found = []
+        for one, two in self._pairs():
+            tree = apart(self.manifold, self._linked(one, two.carrier), self._linked(two, None))
+            if _least(tree, self.manifold.point(q)) < 0:
+                found.append((one.link, two.link))
+        for name, function, one, _ in self._at_walls:
+            if function.value(q) < 0:
+                found.append((one.link, name))
+        return [*dict.fromkeys(found)]
+
+    # ------------------------------------------------------------------------------------ motion
+
+    def system(
+        self,
+        *,
+        gravity: ArrayLike | None = None,
+        density: float = 1.0,
+        masses: Mapping[str, Mass] | None = None,
+        torques: "Mapping[str, sympy.Expr] | None" = None,
+        friction: float | Mapping[str, float] = 0.0,
+        restitution: float | Mapping[str, float] = 0.0,
+    ) -> System:
+        """Return the mechanical system of links and bodies.
+
+        Joints have the damping and friction of their own.
+
+        Parameters
+        ----------
+        gravity : (3,) array, optional
+            Force per mass; default none.
+        density : float, optional
+            Of free bodies without a mass of their own.
+        masses : mapping from str to Mass, optional
+            Of free bodies.
+        torques : mapping from str to sympy.Expr, optional
+            Torque or force of drives by joint, functions of coordinates, velocities and the time
+            (:func:`~polycorner.motion.time_symbol`).  Beyond the effort of the joint it is cut off.
+        friction : float or mapping from str to float, optional
+            Coulomb's coefficient at walls, for all or by wall; half-spaces only.
+        restitution : float or mapping from str to float, optional
+            As in :class:`~polycorner.System`.
+
+        Raises
+        ------
+        ValueError
+            Also for a joint that moves nothing that has mass.
+        NotImplementedError
+            For two sharp polyhedra that can touch.
+        """
+        import sympy
+
+        pull = checks.reals("gravity", [0, 0, 0] if gravity is None else gravity)
+        if pull.shape != (3,) or not np.isfinite(pull).all():
+            refuse("gravity", "3 finite numbers", gravity)
+        given = checks.mapping("masses", {} if masses is None else masses)
+        checks.names("masses", given, self.bodies)
+        motions = self._motions
+        kinetic = potential = sympy.S.Zero
+        for carrier, several in self._inertias(given, density).items():
+            if several and carrier != WORLD:
+                for mass in several:
+                    kinetic += link_laws.kinetic(motions[carrier], mass)
+                    there = motions[carrier].point(mass.centre)
+                    potential += dot([number(-mass.mass * g) for g in pull.tolist()], there)
+        kinetic += self._along_norms(given, density)
+        polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self._contacts(excluded=False))))
+        given = checks.mapping("torques", {} if torques is None else torques)
+        checks.names("torques", given, self._tree.free)
+        driven = link_laws.forces(self.joints, self._rates, given)
+        laws = (*link_laws.joint_friction(self.joints, self._rates), *self._wall_friction(friction))
+        return System(polyhedron, kinetic, potential, driven, laws, restitution=restitution)
+
+    def _wall_friction(self, given: float | Mapping[str, float]) -> Iterator[Friction]:
+        """Yield the friction of links and bodies at half-spaces."""
+        by_wall = given if isinstance(given, Mapping) else dict.fromkeys(self.walls, given)
+        checks.names("friction", by_wall, self.walls)
+        for name, function, one, point in self._at_walls:
+            mu = checks.real("friction", by_wall.get(name, 0.0), least=0)
+            wall = self.walls[name]
+            if mu and not isinstance(wall, HalfSpace):
+                refuse("friction", f"0 for {name!r}, which is no half-space", mu)
+            if mu and isinstance(wall, HalfSpace):
+                slip = link_laws.slips(self._motions[one.carrier], point, one.part.radius, wall)
+                yield Friction(f"{function.name} slips", slip, Disc(mu), function.name)
+
+    @cached_property
+    def _rates(self) -> "dict[str, sympy.Symbol]":
+        return dict(zip(self.manifold.names, velocities(self.manifold), strict=True))
+
+    @cached_property
+    def _motions(self) -> dict[str, Moving]:
+        """The motion of each carrier, as formulas."""
+        found = {WORLD: still()}
+        for carrier, (before, step) in self._tree.steps.items():
+            found[carrier] = moved(found[before], step, self._rates)
+        return found
+
+    def _inertias(self, given: Mapping[str, Mass], density: float) -> dict[str, list[Mass]]:
+        """Return the masses in the axes of each carrier."""
+        found: dict[str, list[Mass]] = {carrier: [] for carrier in (WORLD, *self._tree.steps)}
+        for name, link in self.links.items():
+            carrier, matrix, origin = self._tree.rests[name]
+            if link.mass is not None:
+                inertia = matrix @ link.mass.inertia @ matrix.T
+                centre = origin + matrix @ link.mass.centre
+                found[carrier].append(Mass(link.mass.mass, centre, inertia))
+        for name, body in self.bodies.items():
+            found[name].append(given[name] if name in given else mass_of(body, density))
+        for carrier, several in found.items():
+            beyond = [m for c in found if carrier in self._tree.path(c) for m in found[c]]
+            if carrier != WORLD and not beyond:
+                refuse("links", f"a mass of {carrier!r}, or beyond it", "none")
+            found[carrier] = [link_laws.joined(several)] if several else []
+        return found
+
+    def _along_norms(self, given: Mapping[str, Mass], density: float) -> "sympy.Expr":
+        """Return what makes masses of quaternions regular, zero where they keep their length."""
+        import sympy
+
+        found, inertias = sympy.S.Zero, self._inertias(given, density)
+        for carrier, (_, step) in self._tree.steps.items():
+            if step.kind == "free":
+                beyond = [m for c in inertias if carrier in self._tree.path(c) for m in inertias[c]]
+                mean = sum(float(np.trace(m.inertia)) for m in beyond) / 3
+                q = [sympy.Symbol(name, real=True) for name in step.reads[3:]]
+                v = [self._rates[name] for name in step.reads[3:]]
+                found += 2 * number(mean) * sum(a * b for a, b in zip(q, v, strict=True)) ** 2
+        return found
+
+
+def _frame(body: Body) -> Frame:
+    """Return the coordinates of a free body: a ball about its origin does not turn."""
+    kind = frame_of(body, "needed")
+    return Frame.ROTATED if kind is Frame.AXIAL else kind
+
+
+def _parts(link: str, body: Body, carrier: str, *, is_linked: bool) -> Iterator[_Carried]:
+    for name, part in body.parts.items():
+        yield _Carried(link, f"{link}.{name}" if name else link, part, carrier, is_linked)
+
+
+def _size(one: Part, two: Part) -> int:
+    """Return how many gaps two parts have, about."""
+    (p, f, e), (q, g, d) = (
+        (len(x.points), *((len(x.facets.faces), len(x.facets.edges)) if x.facets else (0, 1)))
+        for x in (one, two)
+    )
+    if p == 1 or q == 1 or f + g == 0:
+        return 1
+    return p * max(g, 1) + q * max(f, 1) + 12 * e * d
+
+
+def _affine() -> Family:
+    import sympy
+
+    rate, q, offset = sympy.symbols("rate q offset", real=True)
+    return Family.of({"gap": rate * q + offset}, ["q"], ["rate", "offset"])
+
+
+def _least(tree: Tree, q: Array) -> float:
+    """Return the value of an and/or tree."""
+    if isinstance(tree, SmoothFunction):
+        return float(tree.value(q))
+    values = [_least(part, q) for part in tree.parts]
+    return max(values) if isinstance(tree, AnyOf) else min(values)

@@ -1,0 +1,284 @@
+"""Where bodies touch in space: points and normals of contacts, from the shapes of the bodies.
+
+They follow from nearest points and not from the formulas of gaps, whose gradients and slips they
+have to agree with.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from polycorner.bodies.pairs import PlacedPart, Touch
+from polycorner.bodies.poses import Placement
+from polycorner.bodies.shapes import Facets
+from polycorner.bodies.slips import rolling_arm
+from polycorner.bodies.walls import HalfSpace, Wall, WallTouch
+from polycorner.bodies.waves import waves
+from polycorner.motion.scenes import Scene, Site
+from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
+from polycorner.values import cached_property
+
+
+@dataclass(frozen=True, eq=False)
+class BodiesInSpace(Scene):
+    """The bodies of an arrangement, and their contacts.
+
+    Attributes
+    ----------
+    placements : tuple of Placement
+    touches : tuple of Touch
+        Contacts of different bodies.
+    at_walls : tuple of WallTouch
+    walls : frozenset of str
+    count : int
+        How often the only body is repeated.
+    twins : function
+        Returns the placements of two bodies like it and their contacts.
+    """
+
+    placements: tuple[Placement, ...]
+    touches: tuple[Touch, ...]
+    at_walls: tuple[WallTouch, ...]
+    walls: frozenset[str]
+    count: int
+    twins: Callable[[], tuple[Sequence[Placement], Sequence[Touch]]]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:  # type: ignore[override] # it is not written
+        """Names of all bodies; of those that are repeated that of the one and a number from 1."""
+        names = tuple(p.name for p in self.placements)
+        if self.count == 1:
+            return names
+        kind = "" if names[0].isdigit() else f"{names[0]} "  # no name but a number
+        return tuple(f"{kind}{k}" for k in range(1, self.count + 1))
+
+    @cached_property
+    def _between(self) -> dict[str, tuple[Touch, Mapping[str, Placement]]]:
+        """The contacts of bodies, and where the coordinates of the two stand."""
+        own = {p.name: p for p in self.placements}
+        found: dict[str, tuple[Touch, Mapping[str, Placement]]] = {
+            t.gap.name: (t, own) for t in self.touches
+        }
+        if self.count > 1:
+            (one, two), touches = self.twins()
+            n = one.manifold.size
+            pair = {one.name: one, two.name: replace(two, at=slice(n, 2 * n))}
+            found |= {t.gap.name: (t, pair) for t in touches}
+        return found
+
+    @cached_property
+    def _at_walls(self) -> dict[str, WallTouch]:
+        return {touch.gap.name: touch for touch in self.at_walls}
+
+    def parties(self, bodies: tuple[int, ...], contact: str) -> tuple[str, ...]:
+        """Return the names of the two that touch at a contact of bodies; empty if not known."""
+        if contact in self._at_walls:
+            member, two = self._at_walls[contact].member, self._at_walls[contact].name
+            return self._called(member, bodies), two
+        if contact in self._between:
+            t, _ = self._between[contact]
+            return self._called(t.one, bodies), self._called(t.two, bodies)
+        return ()
+
+    def _called(self, m: PlacedPart, bodies: tuple[int, ...]) -> str:
+        """Return the name of a body, where it is repeated that of one of those at the contact."""
+        if self.count == 1 or not m.coordinates:
+            return m.body
+        is_second = len(bodies) > 1 and m.body == f"{self.placements[0].name}2"
+        return self.names[bodies[int(is_second)]]
+
+    def site(self, bodies: tuple[int, ...], contact: str, q: Array) -> Site | None:
+        """Return where a contact of bodies is; None if it is not known."""
+        if not (names := self.parties(bodies, contact)):
+            return None
+        a, b = names
+        own = q[list(bodies)].ravel()
+        if contact in self._at_walls:
+            _, member, local, wall, _ = self._at_walls[contact]
+            (p,) = _placed(member, local[None], {x.name: x for x in self.placements}, own)
+            normal, radius = _inward(wall, p), member.part.radius
+            return Site(a, b, p - radius * normal, normal, radius)
+        touch, placements = self._between[contact]
+        one, two = touch.one, touch.two
+        first = _placed(one, touch.first, placements, own)
+        second = _placed(two, touch.second, placements, own)
+        away = _to_image(one, two, placements, own)
+        facets = _turned(two, placements, own) if len(second) > 2 else None
+        p, normal = _nearest(first, second + away, facets)
+        return Site(a, b, p - one.part.radius * normal, normal, rolling_arm(one.part, two.part))
+
+
+@dataclass(frozen=True, eq=False)
+class KindsInSpace(Scene):
+    """Bodies of several kinds, numbered kind after kind, and their contacts.
+
+    Attributes
+    ----------
+    alone : mapping from str to BodiesInSpace
+        One body of each kind.
+    count : mapping from str to int
+    twins : function
+        Returns the placements of two bodies of given kinds, and their contacts.
+    """
+
+    alone: Mapping[str, BodiesInSpace]
+    count: Mapping[str, int]
+    twins: Callable[[str, str], tuple[Sequence[Placement], Sequence[Touch]]]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:  # type: ignore[override] # it is not written
+        """Names of all bodies: that of the kind and a number from 1."""
+        return tuple(f"{kind} {k}" for kind, n in self.count.items() for k in range(1, n + 1))
+
+    @cached_property
+    def walls(self) -> frozenset[str]:  # type: ignore[override] # it is not written
+        """Which names are those of walls."""
+        return frozenset().union(*(one.walls for one in self.alone.values()))
+
+    @cached_property
+    def _kinds(self) -> list[str]:
+        return [kind for kind, n in self.count.items() for _ in range(n)]
+
+    @cached_property
+    def _met(self) -> dict[tuple[str, str], BodiesInSpace]:
+        return {}
+
+    def _pair(self, one: str, two: str) -> BodiesInSpace:
+        """Return two bodies of given kinds by themselves."""
+        if (one, two) not in self._met:
+            (p, q), touches = self.twins(one, two)
+            n = p.manifold.size
+            placed = (replace(p, at=slice(n)), replace(q, at=slice(n, n + q.manifold.size)))
+            pair = BodiesInSpace(placed, tuple(touches), (), frozenset(), 1, self.twins)  # type: ignore[arg-type] # not repeated
+            self._met[one, two] = pair
+        return self._met[one, two]
+
+    def _alone(self, bodies: tuple[int, ...]) -> BodiesInSpace:
+        kinds = [self._kinds[i] for i in bodies]
+        return self.alone[kinds[0]] if len(bodies) == 1 else self._pair(kinds[0], kinds[1])
+
+    def parties(self, bodies: tuple[int, ...], contact: str) -> tuple[str, ...]:
+        """Return the names of the two that touch at a contact of bodies; empty if not known."""
+        scene = self._alone(bodies)
+        called = dict(zip(scene.names, (self.names[i] for i in bodies), strict=True))
+        return tuple(called.get(name, name) for name in scene.parties((0,), contact))
+
+    def site(self, bodies: tuple[int, ...], contact: str, q: Array) -> Site | None:
+        """Return where a contact of bodies is; None if it is not known."""
+        scene = self._alone(bodies)
+        sizes = [p.manifold.size for p in scene.placements]
+        own = np.concatenate([q[i, :n] for i, n in zip(bodies, sizes, strict=True)])
+        found = scene.site((0,), contact, own[None])
+        if found is None:
+            return None
+        one, two = self.parties(bodies, contact)
+        return found._replace(one=one, two=two)
+
+
+def _inward(wall: Wall, p: Array) -> Array:
+    """Return the unit normal of a wall where a point ``(d,)`` of a body is nearest to it."""
+    if isinstance(wall, HalfSpace):
+        return wall.normal
+    away = p - wall.point
+    if wall.axis is not None:
+        away = away - (away @ wall.axis) * wall.axis
+    if wall.waves:
+        x, y = wall.around @ away
+        _, slope = waves(math.atan2(y, x), [(k, *wave) for k, wave in wall.waves.items()])
+        away = away - np.array([-y, x]) @ wall.around * float(slope) / math.hypot(x, y)
+    return np.asarray(-away / np.linalg.norm(away))
+
+
+def _pose(m: PlacedPart, placements: Mapping[str, Placement], q: Array) -> tuple[Array, Array]:
+    d = m.part.dimension
+    return placements[m.body].pose(q) if m.coordinates else (np.zeros(d), np.eye(d))
+
+
+def _placed(m: PlacedPart, points: Array, placements: Mapping[str, Placement], q: Array) -> Array:
+    origin, matrix = _pose(m, placements, q)
+    return np.asarray(origin + points @ matrix.T)
+
+
+def _turned(m: PlacedPart, placements: Mapping[str, Placement], q: Array) -> Facets | None:
+    """Return the facets of a part, with the normals that they have in space."""
+    _, matrix = _pose(m, placements, q)
+    f = m.part.facets
+    return None if f is None else Facets(f.faces, f.normals @ matrix.T, f.edges)
+
+
+def _to_image(
+    one: PlacedPart, two: PlacedPart, placements: Mapping[str, Placement], q: Array
+) -> Array:
+    """Return the displacement of the second part to the image that touches the first."""
+    if one.image is None and two.image is None:
+        return np.zeros(one.part.dimension)
+    image, sign = (two.image, 1.0) if two.image is not None else (one.image, -1.0)
+    assert image is not None, two.name
+    shift = sign * image.shift
+    if one.body == two.body:
+        return np.asarray(shift)
+    a, b = (_placed(m, m.middle[None], placements, q)[0] for m in (one, two))
+    axes = list(image.axes)
+    shift = shift.copy()
+    shift[axes] += image.periods[axes] * np.round((a - b - shift)[axes] / image.periods[axes])
+    return np.asarray(shift)
+
+
+def _nearest(first: Array, second: Array, facets: Facets | None) -> tuple[Array, Array]:
+    """Return the point of the first hull nearest to the second, and the unit vector towards it.
+
+    The first is a point, or a segment if the second is one.  Three cases: the nearest point of the
+    second is on an edge; over a face; the hulls touch, and the normal is that of the nearest face.
+    """
+    if len(first) == 2:
+        p, foot = _nearest_of_segments(first, second)
+    else:
+        p = first[0]
+        foot = _nearest_on(p, second, facets)
+    away = p - foot
+    size = float(np.linalg.norm(away))
+    extent = float(np.abs(second - first[0]).max(initial=size))
+    if size > DEFAULT.alike * extent:
+        return p, away / size
+    if facets is not None:
+        starts = second[[face[0] for face in facets.faces]]
+        heights = ((p - starts) * facets.normals).sum(axis=1)
+        return p, facets.normals[int(np.argmax(heights))]
+    normal = np.cross(first[-1] - first[0], second[-1] - second[0])
+    return p, normal / np.linalg.norm(normal)
+
+
+def _nearest_on(p: Array, points: Array, facets: Facets | None) -> Array:
+    """Return the point of a hull, given by its vertices, that is nearest to a point outside."""
+    if facets is None:
+        return points[0] if len(points) == 1 else _foot(p, points[0], points[1])
+    planar = len(p) == 2
+    edges = facets.faces if planar else tuple(edge[:2] for edge in facets.edges)
+    feet = [_foot(p, points[e[0]], points[e[1]]) for e in edges]
+    for face, normal in zip(() if planar else facets.faces, facets.normals, strict=False):
+        corners = points[list(face)]
+        height = normal @ (p - corners[0])
+        along = np.roll(corners, -1, axis=0) - corners
+        if height > 0 and (np.cross(along, p - corners) @ normal >= 0).all():
+            feet.append(p - height * normal)
+    return min(feet, key=lambda foot: float(np.linalg.norm(p - foot)))
+
+
+def _nearest_of_segments(first: Array, second: Array) -> tuple[Array, Array]:
+    """Return the nearest points of two segments: both inside them, or one of them an end."""
+    pairs = [(p, _foot(p, *second)) for p in first]
+    pairs += [(_foot(q, *first), q) for q in second]
+    u, v = first[1] - first[0], second[1] - second[0]
+    found, _, rank, _ = np.linalg.lstsq(np.column_stack([u, -v]), second[0] - first[0], rcond=None)
+    if rank == 2 and (found >= 0).all() and (found <= 1).all():
+        pairs.append((first[0] + found[0] * u, second[0] + found[1] * v))
+    return min(pairs, key=lambda pair: float(np.linalg.norm(pair[0] - pair[1])))
+
+
+def _foot(p: Array, start: Array, end: Array) -> Array:
+    along = end - start
+    at = (p - start) @ along / (along @ along)
+    return np.asarray(start + min(1.0, max(0.0, float(at))) * along)
