@@ -40,6 +40,8 @@ from examples import (
     ex29_cages,
     ex30_clusters_of_atoms,
     ex31_landscape,
+    ex34_two_link_arm,
+    ex35_slider_crank,
 )
 from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
@@ -393,3 +395,23 @@ def test_a_ball_leaves_its_pocket_over_the_tip_of_a_wedge(tmp_path):
     assert [path.stat().st_size > 10_000 for path in ex31_landscape.draw(found, tmp_path)]
     film = ex31_landscape.film(found, tmp_path / "way.gif", frames=3)
     assert film.read_bytes()[:3] == b"GIF"
+
+
+def test_two_link_arm():
+    """What motors did is kept as energy or lost; the hand pushes until the motors stop."""
+    result = ex34_two_link_arm.main()
+    assert result.path.converged
+    assert result.path.audit < 1e-5
+    tip = result.arm.placed(result.path.q[-1, 0])["lower"].parts[""].points[1]
+    assert tip[1] == pytest.approx(0.06, abs=1e-4)  # the hand lies on the floor
+    block = result.path.q[-1, 0, result.arm.manifold.names.index("xblock")]
+    assert block - tip[0] == pytest.approx(0.06 + 0.15, abs=2e-3)
+    assert result.moved > 0.6
+    assert result.proved
+
+
+def test_slider_crank():
+    result = ex35_slider_crank.main()
+    assert result.error < 1e-5
+    assert result.path.audit < 1e-5
+    assert np.ptp(result.piston) == pytest.approx(2 * ex35_slider_crank.CRANK, rel=1e-4)

@@ -147,9 +147,11 @@ def completed(
     poses = dict.fromkeys((WORLD, *fixed), (np.zeros(d), np.eye(d)))
     bodies = [p.name for p in mechanism.placements]
     poses |= {n: pose_of("placed", one, d) for n, one in given.items() if n in bodies}
+    idle = set(values)
     waiting = sorted(joints, key=lambda name: name not in values)
     while name := next((n for n in waiting if 0 < _known(joints[n], poses) < 2), None):
         joint = joints[name]
+        idle.discard(name)
         with about(f"joints[{name!r}]"):
             away, turn = relative(joint, values.get(name, 0.0), d)
         if joint.parent in poses:
@@ -159,6 +161,9 @@ def completed(
             origin, matrix = poses[joint.child]
             whole = matrix @ turn.T
             poses[joint.parent] = origin - whole @ away, whole
+    if idle:
+        expected = "values of joints that place a body, and not of bodies that are placed already"
+        refuse("joints", expected, min(idle))
     for name in bodies:
         if name not in given and name in poses:
             origin, matrix = poses[name]

@@ -415,10 +415,45 @@ def highest_square(
         rows, bends = equations
         answer = np.linalg.solve(mass, np.column_stack([rows.T, force]))
         balance = np.linalg.lstsq(rows @ answer[:, :-1], -rows @ answer[:, -1], rcond=None)[0]
-        _, sizes, directions = np.linalg.svd(rows * scales)
-        rank = int((sizes > 1e-10 * sizes.max(initial=0)).sum())
-        tangent = scales[:, None] * directions[rank:].T
+        tangent = _tangent(rows, scales)
         mass = tangent.T @ mass @ tangent
         stiffness = tangent.T @ (stiffness - np.tensordot(balance, bends, 1)) @ tangent
     squares = np.abs(np.linalg.eigvals(np.linalg.solve(mass, stiffness)))
     return float(squares.max(initial=0.0))
+
+
+def highest_damping(
+    formulation: Formulation,
+    parameters: Array,
+    scales: Array,
+    q: Array,
+    v: Array,
+    rows: Array | None = None,
+) -> float:
+    """Return the highest rate at which applied forces damp small motions about a state.
+
+    Equations with the gradients ``rows`` ``(j, k)`` leave their tangent space.
+    """
+    now = moment(formulation, parameters, q, v)
+    mass, slope = now.mass, np.empty_like(now.mass)
+    if not np.isfinite(now.force).all():
+        return 0.0  # the first step says what is wrong
+    for i, scale in enumerate(scales):
+        change = np.zeros(len(scales))
+        change[i] = 1e-5 * (scale + abs(v[i]))
+        forth = moment(formulation, parameters, q, v + change).applied
+        back = moment(formulation, parameters, q, v - change).applied
+        with np.errstate(invalid="ignore"):
+            slope[:, i] = (forth - back) / (2 * change[i])
+    if not np.isfinite(slope).all():
+        return 0.0
+    tangent = np.diag(scales) if rows is None else _tangent(rows, scales)
+    answer = np.linalg.solve(tangent.T @ mass @ tangent, tangent.T @ slope @ tangent)
+    return float(-np.linalg.eigvals(answer).real.min(initial=0.0))
+
+
+def _tangent(rows: Array, scales: Array) -> Array:
+    """Return a basis of the directions along equations, as columns."""
+    _, sizes, directions = np.linalg.svd(rows * scales)
+    rank = int((sizes > 1e-10 * sizes.max(initial=0)).sum())
+    return np.asarray(scales[:, None] * directions[rank:].T)

@@ -21,7 +21,13 @@ from polycorner.motion.contacts import (
     position_of,
     slip_text,
 )
-from polycorner.motion.formulation import Formulation, Laws, energies, highest_square
+from polycorner.motion.formulation import (
+    Formulation,
+    Laws,
+    energies,
+    highest_damping,
+    highest_square,
+)
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
@@ -370,7 +376,11 @@ class System(MechanicalSystem, Printed):
 
     @checked
     def largest_step(self, state: State) -> tuple[float, str]:
-        """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit."""
+        """Return ``2 / omega`` with the highest frequency of small motions: the leapfrog limit.
+
+        Where forces damp motions at the rate ``c``, at most ``1.5 / c``, which the iterations for
+        the velocity in the middle of a step resolve.
+        """
         n = self.manifold.size
         return leapfrog_limit(self, state.q.reshape(-1, n), state.v.reshape(-1, n))
 
@@ -408,11 +418,16 @@ class System(MechanicalSystem, Printed):
 def leapfrog_limit(system: System, places: Array, speeds: Array) -> tuple[float, str]:
     """Return the largest step of bodies ``(N, n)`` in s, and what limits it."""
     scales, law, known = system.manifold.scale_array, system.formulation, system.parameters
-    squared = max(
-        highest_square(law, known, scales, q, v, bends(system.polyhedron, q))
-        for q, v in zip(places, speeds, strict=True)
-    )
+    squared, damping = 0.0, 0.0
+    for q, v in zip(places, speeds, strict=True):
+        held = bends(system.polyhedron, q)
+        squared = max(squared, highest_square(law, known, scales, q, v, held))
+        if system.forces:
+            rows = None if held is None else held[0]
+            damping = max(damping, highest_damping(law, known, scales, q, v, rows))
     longest = 2 / math.sqrt(squared) if squared > 1e-12 else math.inf
+    if damping * longest > 1.5:
+        return 1.5 / damping, "beyond which the damping is not resolved"
     return longest, "beyond which the motion is unstable"
 
 

@@ -15,6 +15,7 @@ from polycorner.bodies import (
     Arrangement,
     Ball,
     Damper,
+    Fixed,
     Gear,
     HalfSpace,
     Hinge,
@@ -26,6 +27,7 @@ from polycorner.bodies import (
     Spring,
     box,
     capsule,
+    compound,
     disc,
     mass_of,
     sphere,
@@ -120,6 +122,92 @@ def test_a_double_pendulum_in_angles_alone(d):
         assert path.audit < 1e-4
     assert errors[1] < 2e-5
     assert 3 < errors[0] / errors[1] < 5
+
+
+def test_a_rod_on_a_ball_joint_goes_round_a_cone():
+    """``w^2 (I + m s^2) cos a = m g s``, without spin, in the coordinates of its axis."""
+    a = Arrangement({"A": ROD}, joints={"p": Ball("world", "A", on=[-1, 0, 0])})
+    mass, angle = mass_of(ROD), 0.7
+    inertia = mass.inertia[1, 1] + mass.mass
+    rate = math.sqrt(mass.mass * G / (inertia * math.cos(angle)))
+    tilt = Rotation.from_euler("y", math.pi / 2 - angle)
+    q = a.point({}, joints={"p": tilt})
+    middle = np.array([math.sin(angle), 0, -math.cos(angle)])
+    assert q[:3] == pytest.approx(middle)
+    v = a.velocity(q, {"A": (rate * np.cross([0, 0, 1], middle), [0, 0, rate])})
+    system = a.system(gravity=BELOW)
+    path = simulate(system, system.state(q, v), 1.0, 1e-3, every=1)
+    turned = Rotation.from_rotvec([0, 0, rate]).as_matrix() @ middle
+    assert path.q[-1, 0, :3] == pytest.approx(turned, abs=1e-4)
+    assert path.audit < 1e-5
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_two_bodies_that_are_fixed_move_as_their_compound(d):
+    """Thrown with a spin about a direction that is no axis of inertia."""
+    rng = np.random.default_rng(5)
+    bar = BAR if d == 2 else ROD
+    turn = 1.1 if d == 2 else Rotation.from_rotvec([0.4, 1.0, -0.5])
+    at, on = rng.normal(size=d), rng.normal(size=d)
+    matrix = turn.as_matrix() if d == 3 else Rotation.from_rotvec([0, 0, turn]).as_matrix()[:2, :2]
+    second = bar.moved(at - matrix @ on, turn)
+    room = box([-99] * d, [99] * d)
+    whole = Arrangement({"W": compound({"a": bar, "b": second})}, room, orientations="all")
+    joints = {"weld": Fixed("A", "B", at=at, on=on, turn=turn)}
+    two = Arrangement({"A": bar, "B": bar}, room, joints=joints)
+    start = np.zeros(d)
+    moving = (np.arange(1.0, d + 1), 2.0 if d == 2 else np.array([1.0, -2.0, 0.5]))
+    ends = []
+    for a, name in ((whole, "W"), (two, "A")):
+        system = a.system(gravity=[*[0] * (d - 1), -G], masses=masses(whole, bar, second, name))
+        q = a.point({name: start})
+        v = a.velocity(q, {name: moving})
+        if name == "A":
+            v = a.velocity(q, carried_along(a, q, moving, d))
+        path = simulate(system, system.state(q, v), 0.5, 5e-4)
+        ends.append(a.placements[0].pose(path.q[-1, 0]))
+        assert path.audit < 1e-5
+    for one, other in zip(*ends, strict=True):
+        assert one == pytest.approx(other, abs=1e-5)
+
+
+def masses(whole, bar, second, name):
+    """Both parts count fully, also where they overlap."""
+    if name == "A":
+        return {}
+    d = bar.dimension
+    parts = [mass_of(bar), mass_of(second)]
+    total = sum(m.mass for m in parts)
+    centre = sum(m.mass * m.centre for m in parts) / total
+    inertia = 0.0
+    for m in parts:
+        x = m.centre - centre
+        steiner = x @ x if d == 2 else x @ x * np.eye(3) - np.outer(x, x)
+        inertia = inertia + m.inertia + m.mass * steiner
+    assert whole.dimension == d
+    return {"W": Mass(total, centre, inertia)}
+
+
+def carried_along(a, q, moving, d):
+    """Velocities of both bodies in the motion of the first as a rigid whole."""
+    velocity, spin = moving
+    away = a.placements[1].pose(q)[0] - a.placements[0].pose(q)[0]
+    turned = np.cross(spin, away) if d == 3 else spin * np.array([-away[1], away[0]])
+    return {"A": moving, "B": (velocity + turned, spin)}
+
+
+def test_a_bead_on_a_wire_of_any_shape():
+    """``y = x^2 / 2`` without friction, in ``x`` alone."""
+    x, y = sympy.symbols("x y", real=True)
+    wire = Rail("world", "A", at=[0, 1], curve=y - x**2 / 2)
+    a = Arrangement({"A": disc(0.1)}, joints={"wire": wire})
+
+    def right(_, s):
+        return [s[1], -s[0] * (G + s[1] ** 2) / (1 + s[0] ** 2)]
+
+    exact = solve_ivp(right, (0, 1.0), [1.2, 0], rtol=1e-11, atol=1e-11).y[0, -1]
+    path = run(a, a.system(gravity=DOWN), placed={"A": [1.2, 1.72]})
+    assert path.q[-1, 0] == pytest.approx([exact, 1 + exact**2 / 2], abs=1e-5)
 
 
 def test_a_parallelogram_swings_as_one_pendulum():
@@ -359,6 +447,28 @@ def test_a_coordinate_of_a_body_is_prescribed():
         slid = abs(path.q[:, 0, 3] - path.q[:, 0, 0]).max()
         assert (slid < 1e-3) == follows
         assert path.q[:, 0, 0] == pytest.approx(0.02 * (1 - np.cos(10 * path.times)), abs=1e-5)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_damper_that_a_step_does_not_resolve_is_refused(d):
+    """``h c / I`` is at most 1.5; a motion that is damped so fast follows the implicit rule."""
+    a = nailed(d)
+    inertia = about_end()[1] if d == 2 else mass_of(ROD).inertia[1, 1] + mass_of(ROD).mass
+    dt = 1e-3
+    q = a.point({}, joints={"nail": 0.3})
+    v = a.velocity(q, {}, joints={"nail": 1.0})
+    for share, fits in ((1.4, True), (1.6, False)):
+        system = a.system(drives={"d": Damper("nail", damping=share * inertia / dt)})
+        state = system.state(q, v)
+        longest, _ = system.largest_step(state)
+        assert longest == pytest.approx(1.5 * dt / share, rel=1e-4)
+        if not fits:
+            with pytest.raises(ValueError, match=r"dt: .*damping is not resolved"):
+                simulate(system, state, 0.1, dt)
+            continue
+        path = simulate(system, state, 2 * dt, dt, every=1)
+        left = (1 - share / 2) / (1 + share / 2)
+        assert np.linalg.norm(path.v[1]) / np.linalg.norm(v) == pytest.approx(left, abs=1e-3)
 
 
 # --------------------------------------------------------------------------------------- forces

@@ -4,6 +4,7 @@ The oracle of a joint is written in matrices: where it puts the child for a valu
 """
 
 import math
+import pickle
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.linalg import null_space
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from polycorner import minimise, prove, stratum_at
+from polycorner import minimise, prove, skeleton, stratum_at
 from polycorner.bodies import (
     Arrangement,
     Ball,
@@ -32,6 +33,7 @@ from polycorner.bodies import (
     sphere,
     thinned,
 )
+from polycorner.proofs import stationary_points
 
 BLOCK = polytope([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], 0.1)
 PLATE = polygon([[0, 0], [1, 0], [0, 1]], 0.1)
@@ -297,6 +299,38 @@ def test_a_ladder_is_lowest_flat_on_the_floor():
     assert c.point == pytest.approx([0.8, 0.6, -math.asin(0.6)])
 
 
+def test_the_skeleton_of_a_ladder_is_an_edge_between_its_limits():
+    joints = {
+        "wall": Rail("world", "L", on=[-1, 0], axis=[0, 1], limits=(0.5, 2.0)),
+        "floor": Rail("world", "L", on=[1, 0], axis=[1, 0], limits=(0.5, 2.0)),
+    }
+    a = Arrangement({"L": capsule([-1, 0], [1, 0], 0.05)}, joints=joints)
+    found = skeleton(a.polyhedron, a.closed([0.6, 0.8, -0.9]))
+    assert sorted(c.active for c in found.corners) == [("floor.min",), ("wall.min",)]
+    assert len(found.edges) == 1
+
+
+def test_all_equilibria_of_a_bar_on_a_nail_are_two():
+    """Complete with proof: hanging, and standing on the nail."""
+    a = Arrangement(
+        {"A": capsule([-1, 0], [1, 0], 0.1)}, joints={"n": Hinge("world", "A", on=[-1, 0])}
+    )
+    height = a.manifold.symbols[1]
+    found = stationary_points(a.polyhedron, height, box={"xA": (-2, 2), "yA": (-2, 2)})
+    assert found.complete
+    heights = sorted(float(p.point[1]) for p in found.points)
+    assert heights == pytest.approx([-1, 1])
+
+
+def test_arrangements_with_joints_are_values():
+    joints = {"w": Rail("world", "A", curve=Y - X**2), "p": Hinge("A", "B", limits=(-1, 1))}
+    a = Arrangement({"A": PLATE, "B": PLATE}, joints=joints)
+    again = pickle.loads(pickle.dumps(a))
+    q = a.point({"A": ([1, 1], 0.3)}, joints={"p": 0.4})
+    assert again.polyhedron.equation_names == a.polyhedron.equation_names
+    assert (again.polyhedron.equation_values(q) == a.polyhedron.equation_values(q)).all()
+
+
 def test_scissors_have_one_motion_and_rise_as_they_close():
     """Two equal bars crossed at their middles: the upper ends are at ``2 l sin``."""
     joints = {
@@ -442,6 +476,10 @@ WRONG = [
     (lambda: nail().joint_function("ball"), "name: .*one coordinate"),
     (lambda: nail().point({}, joints={"nail": "x"}), "nail.*number"),
     (lambda: nail().point({}, joints={"nagel": 1.0}), "joints: .*nagel"),
+    (
+        lambda: nail().point({"A": ([0, 0], 0.3), "B": [2, 0]}, joints={"nail": 0.3}),
+        "joints: .*placed already; got 'nail'",
+    ),
     (lambda: nail().velocity([0, 0, 0, 2, 0], {}, joints={"ball": 1.0}), "joints: "),
     (lambda: scaled(nail()), "arrangement: .*joints"),
 ]
