@@ -114,7 +114,7 @@ GROUPS = (
         "Rigid bodies in the plane and in space, walls, and sets of placements without overlap.",
         {
             "bodies": "Arrangement Body Part disc sphere capsule polygon polytope compound "
-            "HalfSpace Cylinder box Mass mass_of scaled thinned Robot RobotLink RobotJoint",
+            "HalfSpace Cylinder box Mass mass_of scaled thinned Robot RobotLink RobotJoint posed",
         },
     ),
     Group(
@@ -176,8 +176,8 @@ GROUPS = (
     ),
     Group(
         "Read what other programs write",
-        "Bodies from meshes.",
-        {"files": "read_mesh Solid MeshOptions"},
+        "Bodies from meshes, robots from URDF files, particles and molecules.",
+        {"files": "read_mesh Solid MeshOptions read_urdf read_particles Particles molecule"},
     ),
     Group(
         "Run a parameter study",

@@ -3,6 +3,7 @@ from .drives import Damper, Motor, Prescribed, Spring
 from .joints import Ball, Fixed, Gear, Hinge, Joint, Planar, Rail, Slider
 from .links import RobotJoint, RobotLink
 from .masses import Mass, mass_of
+from .posed import posed
 from .robots import Robot
 from .shapes import Body, Part, capsule, compound, disc, polygon, polytope, sphere
 from .sizes import scaled, thinned
@@ -37,6 +38,7 @@ __all__ = [
     "mass_of",
     "polygon",
     "polytope",
+    "posed",
     "scaled",
     "sphere",
     "thinned",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.bodies.chains import Moving, clean, crossed, dot, times, transposed
+from polycorner.bodies.chains import Moving, Step, clean, crossed, dot, times, transposed
 from polycorner.bodies.links import RobotJoint
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.rigid_motions import number, spin
@@ -85,3 +85,13 @@ def kinetic(motion: Moving, mass: Mass) -> "sympy.Expr":
     inertia = [[number(x) for x in row] for row in mass.inertia.tolist()]
     turning = dot(omega, times(inertia, omega))
     return (number(mass.mass) * sum(v**2 for v in speed) + turning) / 2
+
+
+def along_norm(step: Step, masses: Sequence[Mass], rates: Rates) -> "sympy.Expr":
+    """Return what makes the masses of a quaternion regular, zero where it keeps its length."""
+    import sympy
+
+    mean = math.fsum(float(np.trace(mass.inertia)) for mass in masses) / 3
+    quaternion = [sympy.Symbol(name, real=True) for name in step.reads[3:]]
+    along = dot(quaternion, [rates[name] for name in step.reads[3:]])
+    return 2 * number(mean) * along**2

@@ -3,11 +3,11 @@
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from itertools import combinations
 from operator import mul
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,7 @@ from polycorner.bodies.chains import (
 from polycorner.bodies.dynamics import smooth
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
+from polycorner.bodies.link_parts import CarriedPart, affine, carried_parts, gaps_of, touch
 from polycorner.bodies.link_trees import WORLD, LinkTree
 from polycorner.bodies.links import RobotJoint, RobotLink
 from polycorner.bodies.masses import Mass, mass_of
@@ -34,13 +35,12 @@ from polycorner.bodies.rigid_motions import number
 from polycorner.bodies.shapes import Body, Part
 from polycorner.bodies.walls import HalfSpace, Wall, within
 from polycorner.checks import refuse
-from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.motion.contacts import Friction, velocities
 from polycorner.motion.friction import Disc
 from polycorner.motion.system import System
-from polycorner.polyhedra.groups import AllOf, AnyOf
+from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
@@ -51,28 +51,15 @@ if TYPE_CHECKING:
 MOST_GAPS = 20_000
 
 
-class _Carried(NamedTuple):
-    """A part in the axes of its carrier, and the link that may touch what is not next to it."""
-
-    link: str
-    name: str
-    part: Part
-    carrier: str
-    is_linked: bool
-
-
 @dataclass(frozen=True, eq=False)
 class Robot(Checked):
     """Links held together by joints in an open chain or tree, and what stands around them.
 
     Coordinates are the joints, an angle or a length each, by the name of the joint; a joint that
-    follows another has none.  Before them are those of the base, if it floats: ``x y z`` and a
-    quaternion, with its name; after them those of bodies that move freely, as in
-    :class:`~polycorner.bodies.Arrangement`.  Contacts are called as there; ``elbow lower`` and
-    ``elbow upper`` are limits.
-
-    Links that share a joint do not touch each other, and neither do those that fixed joints hold
-    together.
+    follows another has none.  Before them are those of the base, if it floats, and after them those
+    of bodies that move freely, as in :class:`~polycorner.bodies.Arrangement`.  Contacts are called
+    as there; ``elbow lower`` and ``elbow upper`` are limits.  Links that share a joint, or are held
+    together by fixed ones, do not touch each other.
 
     Parameters
     ----------
@@ -150,6 +137,23 @@ class Robot(Checked):
         object.__setattr__(self, "ignored", tuple(map(tuple, self.ignored)))
         super().__post_init__()
 
+    def among(
+        self,
+        *,
+        walls: Mapping[str, Wall] | None = None,
+        fixed: Mapping[str, Body] | None = None,
+        bodies: Mapping[str, Body] | None = None,
+        ignored: Sequence[tuple[str, str]] = (),
+    ) -> "Robot":
+        """Return the robot with more around it, and more pairs that do not touch."""
+        return replace(
+            self,
+            walls={**self.walls, **checks.mapping("walls", walls or {})},
+            fixed={**self.fixed, **checks.mapping("fixed", fixed or {})},
+            bodies={**self.bodies, **checks.mapping("bodies", bodies or {})},
+            ignored=(*self.ignored, *ignored),
+        )
+
     @cached_property
     def _tree(self) -> LinkTree:
         loose = {name: _frame(body) for name, body in self.bodies.items()}
@@ -161,17 +165,19 @@ class Robot(Checked):
         return self._tree.root
 
     @cached_property
-    def _carried(self) -> list[_Carried]:
+    def _carried(self) -> list[CarriedPart]:
         """All parts in the axes of their carriers."""
-        found: list[_Carried] = []
+        found: list[CarriedPart] = []
         for name, link in self.links.items():
             carrier, matrix, origin = self._tree.rests[name]
             if link.body is not None:
-                found += _parts(name, link.body.carried(origin, matrix), carrier, is_linked=True)
+                found += carried_parts(
+                    name, link.body.carried(origin, matrix), carrier, is_linked=True
+                )
         for name, body in self.fixed.items():
-            found += _parts(name, body, WORLD, is_linked=False)
+            found += carried_parts(name, body, WORLD, is_linked=False)
         for name, body in self.bodies.items():
-            found += _parts(name, body, name, is_linked=False)
+            found += carried_parts(name, body, name, is_linked=False)
         return found
 
     # --------------------------------------------------------------------------------- the space
@@ -268,22 +274,18 @@ class Robot(Checked):
         return self._tree.poses(dict(zip(self.manifold.names, point, strict=True)))
 
     def pose(self, q: ArrayLike, link: str) -> Pose:
-        """Return the matrix ``(3, 3)`` and the origin ``(3,)`` of a link at a point."""
-        checks.names("link", [link], self.links)
-        carrier, matrix, origin = self._tree.rests[link]
+        """Return matrix ``(3, 3)`` and origin ``(3,)`` of a link or free body at a point."""
+        checks.names("link", [link], {**self.links, **self.bodies})
+        carrier, matrix, origin = self._tree.rests.get(link, (link, np.eye(3), np.zeros(3)))
         turned, at = self._poses(q)[carrier]
         return turned @ matrix, at + turned @ origin
 
     def placed(self, q: ArrayLike) -> dict[str, Body]:
         """Return the links that have bodies, free and fixed bodies where they are at a point."""
-        poses, found = self._poses(q), {}
-        for name, link in self.links.items():
-            if link.body is not None:
-                carrier, matrix, origin = self._tree.rests[name]
-                turned, at = poses[carrier]
-                found[name] = link.body.carried(at + turned @ origin, turned @ matrix)
-        found |= {n: b.carried(poses[n][1], poses[n][0]) for n, b in self.bodies.items()}
-        return {**found, **self.fixed}
+        found = {name: link.body for name, link in self.links.items() if link.body is not None}
+        found |= self.bodies
+        moved = {name: body.carried(*self.pose(q, name)[::-1]) for name, body in found.items()}
+        return {**moved, **self.fixed}
 
     # ---------------------------------------------------------------------------------- contacts
 
@@ -294,13 +296,13 @@ class Robot(Checked):
 
     def _contacts(self, *, excluded: bool) -> list[Tree]:
         pairs = [*self._pairs()]
-        size = sum(_size(one.part, two.part) for one, two in pairs)
+        size = sum(gaps_of(one.part, two.part) for one, two in pairs)
         if size > MOST_GAPS:
-            one, two = max(pairs, key=lambda pair: _size(pair[0].part, pair[1].part))
+            one, two = max(pairs, key=lambda pair: gaps_of(pair[0].part, pair[1].part))
             msg = (
                 f"links: expected parts with at most {MOST_GAPS} gaps, of vertices, edges and "
                 f"faces; got {size}, of which {one.name!r} and {two.name!r} have "
-                f"{_size(one.part, two.part)}; capsules have one each"
+                f"{gaps_of(one.part, two.part)}; capsules have one each"
             )
             raise ValueError(msg)
         found: list[Tree] = [
@@ -318,13 +320,13 @@ class Robot(Checked):
             refuse("links", "something that links can touch, or limits of joints", [*self.links])
         return found
 
-    def _linked(self, one: _Carried, start: str | None) -> PlacedPart:
+    def _linked(self, one: CarriedPart, start: str | None) -> PlacedPart:
         """Return a part as it is placed from a carrier, or in its own."""
         chain = None if start is None else self._tree.chain(start, one.carrier)
         frame = Frame.FIXED if chain is None else Frame.LINKED
         return PlacedPart(one.link, one.name, one.part, frame, None, (), np.zeros(3), chain=chain)
 
-    def _pairs(self) -> Iterator[tuple[_Carried, _Carried]]:
+    def _pairs(self) -> Iterator[tuple[CarriedPart, CarriedPart]]:
         """Yield the parts that can touch; the first is one that moves."""
         ignored = {frozenset(pair) for pair in self.ignored}
         for one, two in combinations(self._carried, 2):
@@ -340,7 +342,7 @@ class Robot(Checked):
             yield (one, two) if one.carrier else (two, one)  # what stands in space is the second
 
     @cached_property
-    def _at_walls(self) -> list[tuple[str, SmoothFunction, _Carried, Array]]:
+    def _at_walls(self) -> list[tuple[str, SmoothFunction, CarriedPart, Array]]:
         """The gaps at walls with their walls, parts and points."""
         ignored = {frozenset(pair) for pair in self.ignored}
         return [
@@ -361,7 +363,7 @@ class Robot(Checked):
                 if joint.moves and math.isfinite(limit):
                     numbers = sign * rate, sign * (offset - limit)
                     function = SmoothFunction.member(
-                        _affine(),
+                        affine(),
                         "gap",
                         self.manifold,
                         parameters=numbers,
@@ -373,15 +375,13 @@ class Robot(Checked):
 
     @checked
     def overlapping(self, q: ArrayLike) -> list[tuple[str, str]]:
-        """Return the pairs of links, or of a link and something else, that overlap at a point."""
-        found = []
-        for one, two in self._pairs():
-            tree = apart(self.manifold, self._linked(one, two.carrier), self._linked(two, None))
-            if _least(tree, self.manifold.point(q)) < 0:
-                found.append((one.link, two.link))
-        for name, function, one, _ in self._at_walls:
-            if function.value(q) < 0:
-                found.append((one.link, name))
+        """Return the pairs of links, free and fixed bodies that overlap or touch at a point."""
+        poses = self._poses(q)
+        found = [
+            (one.link, two.link)
+            for one, two in self._pairs()
+            if touch(*(x.part.moved(*poses[x.carrier][::-1]) for x in (one, two)))
+        ]
         return [*dict.fromkeys(found)]
 
     # ------------------------------------------------------------------------------------ motion
@@ -413,7 +413,7 @@ class Robot(Checked):
             (:func:`~polycorner.motion.time_symbol`).  Beyond the effort of the joint it is cut off.
         friction : float or mapping from str to float, optional
             Coulomb's coefficient at walls, for all or by wall; half-spaces only.
-        restitution : float or mapping from str to float, optional
+        restitution : optional
             As in :class:`~polycorner.System`.
 
         Raises
@@ -430,15 +430,17 @@ class Robot(Checked):
             refuse("gravity", "3 finite numbers", gravity)
         given = checks.mapping("masses", {} if masses is None else masses)
         checks.names("masses", given, self.bodies)
-        motions = self._motions
         kinetic = potential = sympy.S.Zero
-        for carrier, several in self._inertias(given, density).items():
-            if several and carrier != WORLD:
-                for mass in several:
-                    kinetic += link_laws.kinetic(motions[carrier], mass)
-                    there = motions[carrier].point(mass.centre)
-                    potential += dot([number(-mass.mass * g) for g in pull.tolist()], there)
-        kinetic += self._along_norms(given, density)
+        inertias = self._inertias(given, density)
+        for carrier, (_, step) in self._tree.steps.items():
+            motion, mass = self._motions[carrier], inertias[carrier]
+            if mass is not None:
+                kinetic += link_laws.kinetic(motion, mass)
+                weights = [number(-mass.mass * g) for g in pull.tolist()]
+                potential += dot(weights, motion.point(mass.centre))
+            if step.kind == "free":
+                beyond = [m for c, m in inertias.items() if m and carrier in self._tree.path(c)]
+                kinetic += link_laws.along_norm(step, beyond, self._rates)
         polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self._contacts(excluded=False))))
         given = checks.mapping("torques", {} if torques is None else torques)
         checks.names("torques", given, self._tree.free)
@@ -471,71 +473,24 @@ class Robot(Checked):
             found[carrier] = moved(found[before], step, self._rates)
         return found
 
-    def _inertias(self, given: Mapping[str, Mass], density: float) -> dict[str, list[Mass]]:
-        """Return the masses in the axes of each carrier."""
-        found: dict[str, list[Mass]] = {carrier: [] for carrier in (WORLD, *self._tree.steps)}
+    def _inertias(self, given: Mapping[str, Mass], density: float) -> dict[str, Mass | None]:
+        """Return the mass that each carrier carries, in its axes."""
+        several: dict[str, list[Mass]] = {carrier: [] for carrier in (WORLD, *self._tree.steps)}
         for name, link in self.links.items():
             carrier, matrix, origin = self._tree.rests[name]
             if link.mass is not None:
                 inertia = matrix @ link.mass.inertia @ matrix.T
                 centre = origin + matrix @ link.mass.centre
-                found[carrier].append(Mass(link.mass.mass, centre, inertia))
+                several[carrier].append(Mass(link.mass.mass, centre, inertia))
         for name, body in self.bodies.items():
-            found[name].append(given[name] if name in given else mass_of(body, density))
-        for carrier, several in found.items():
-            beyond = [m for c in found if carrier in self._tree.path(c) for m in found[c]]
-            if carrier != WORLD and not beyond:
+            several[name].append(given[name] if name in given else mass_of(body, density))
+        for carrier in self._tree.steps:
+            if not any(several[c] for c in several if carrier in self._tree.path(c)):
                 refuse("links", f"a mass of {carrier!r}, or beyond it", "none")
-            found[carrier] = [link_laws.joined(several)] if several else []
-        return found
-
-    def _along_norms(self, given: Mapping[str, Mass], density: float) -> "sympy.Expr":
-        """Return what makes masses of quaternions regular, zero where they keep their length."""
-        import sympy
-
-        found, inertias = sympy.S.Zero, self._inertias(given, density)
-        for carrier, (_, step) in self._tree.steps.items():
-            if step.kind == "free":
-                beyond = [m for c in inertias if carrier in self._tree.path(c) for m in inertias[c]]
-                mean = sum(float(np.trace(m.inertia)) for m in beyond) / 3
-                q = [sympy.Symbol(name, real=True) for name in step.reads[3:]]
-                v = [self._rates[name] for name in step.reads[3:]]
-                found += 2 * number(mean) * sum(a * b for a, b in zip(q, v, strict=True)) ** 2
-        return found
+        return {c: link_laws.joined(masses) if masses else None for c, masses in several.items()}
 
 
 def _frame(body: Body) -> Frame:
     """Return the coordinates of a free body: a ball about its origin does not turn."""
     kind = frame_of(body, "needed")
     return Frame.ROTATED if kind is Frame.AXIAL else kind
-
-
-def _parts(link: str, body: Body, carrier: str, *, is_linked: bool) -> Iterator[_Carried]:
-    for name, part in body.parts.items():
-        yield _Carried(link, f"{link}.{name}" if name else link, part, carrier, is_linked)
-
-
-def _size(one: Part, two: Part) -> int:
-    """Return how many gaps two parts have, about."""
-    (p, f, e), (q, g, d) = (
-        (len(x.points), *((len(x.facets.faces), len(x.facets.edges)) if x.facets else (0, 1)))
-        for x in (one, two)
-    )
-    if p == 1 or q == 1 or f + g == 0:
-        return 1
-    return p * max(g, 1) + q * max(f, 1) + 12 * e * d
-
-
-def _affine() -> Family:
-    import sympy
-
-    rate, q, offset = sympy.symbols("rate q offset", real=True)
-    return Family.of({"gap": rate * q + offset}, ["q"], ["rate", "offset"])
-
-
-def _least(tree: Tree, q: Array) -> float:
-    """Return the value of an and/or tree."""
-    if isinstance(tree, SmoothFunction):
-        return float(tree.value(q))
-    values = [_least(part, q) for part in tree.parts]
-    return max(values) if isinstance(tree, AnyOf) else min(values)

@@ -2,12 +2,15 @@ from .certificates import load_certificate, save_certificate
 from .graphs import load_graph, save_graph, skeleton_graph
 from .landscapes import load_landscape, save_landscape
 from .meshes import MeshOptions, Solid, read_mesh
+from .particles import Particles, molecule, read_particles
 from .problems import ProblemFile, load_problem, save_problem
 from .skeletons import load_skeleton, save_skeleton
 from .trajectories import load_trajectory, save_trajectory
+from .urdf import read_urdf
 
 __all__ = [
     "MeshOptions",
+    "Particles",
     "ProblemFile",
     "Solid",
     "load_certificate",
@@ -16,7 +19,10 @@ __all__ = [
     "load_problem",
     "load_skeleton",
     "load_trajectory",
+    "molecule",
     "read_mesh",
+    "read_particles",
+    "read_urdf",
     "save_certificate",
     "save_graph",
     "save_landscape",

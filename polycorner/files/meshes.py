@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from polycorner import checks
 from polycorner.bodies.masses import Mass, mass_of
-from polycorner.bodies.shapes import Body, Part
+from polycorner.bodies.shapes import Body, Part, capsule, sphere
 from polycorner.checks import missing_extra, refuse
 from polycorner.files.safe_paths import content, name_of, within
 from polycorner.kinds import checked
@@ -140,18 +140,12 @@ def read_mesh(
     (8, 6.0, [6.5, 5.0, 2.5])
     """
     options = MeshOptions() if options is None else options
+    scale = checks.real("scale", scale, above=0)
     about, mesh = f"path: {name_of(path)}", load_mesh(path, scale, options.megabytes)
     density = checks.real("density", density, above=0)
     is_closed = mesh.is_watertight and mesh.is_winding_consistent
-    if is_closed and mesh.volume < 0:
-        mesh.invert()  # all faces from inside
-    if not (is_closed or parts == "hull"):
-        _refuse_open(about, mesh)
-    pieces = _pieces(about, mesh, parts, options.concavity)
-    hulls = [_at_most(about, corners(about, points), options) for points in pieces]
-    filled = math.fsum(float(ConvexHull(hull).volume) for hull in hulls)
-    named = [str(k) for k in range(1, len(hulls) + 1)] if len(hulls) > 1 else [""]
-    body = Body({name: Part(hull, 0.0) for name, hull in zip(named, hulls, strict=True)})
+    body = convex_body(about, mesh, parts, options)
+    filled = math.fsum(float(ConvexHull(part.points).volume) for part in body.parts.values())
     volume = float(mesh.volume) if is_closed else filled
     with checks.about(about):
         mass = mass_of(body, density)
@@ -163,7 +157,20 @@ def read_mesh(
     return Solid(body, mass, volume, filled / volume - 1)
 
 
-def load_mesh(path: str | os.PathLike[str], scale: float, megabytes: float) -> Any:
+def convex_body(about: str, mesh: Any, parts: str, options: MeshOptions) -> Body:
+    """Return the convex parts of a mesh; see :func:`read_mesh`."""
+    is_closed = mesh.is_watertight and mesh.is_winding_consistent
+    if is_closed and mesh.volume < 0:
+        mesh.invert()  # all faces from inside
+    if not (is_closed or parts == "hull"):
+        _refuse_open(about, mesh)
+    pieces = _pieces(about, mesh, parts, options.concavity)
+    hulls = [_at_most(about, corners(about, points), options) for points in pieces]
+    names = [str(k) for k in range(1, len(hulls) + 1)] if len(hulls) > 1 else [""]
+    return Body({name: Part(hull, 0.0) for name, hull in zip(names, hulls, strict=True)})
+
+
+def load_mesh(path: str | os.PathLike[str], scale: float | Array, megabytes: float) -> Any:
     """Return the triangles of a file as a ``trimesh.Trimesh`` with finite vertices."""
     import trimesh
 
@@ -172,7 +179,6 @@ def load_mesh(path: str | os.PathLike[str], scale: float, megabytes: float) -> A
         expected = f"a file name that ends in {checks.listed(f'.{f}' for f in FORMATS)}"
         refuse("path", expected, os.fspath(path))
     data = content("path", path, megabytes)
-    scale = checks.real("scale", scale, above=0)
     beside = _buffers(about, data, Path(path).parent, megabytes) if kind == "gltf" else {}
     try:
         scene = trimesh.load_scene(
@@ -354,3 +360,41 @@ def _at_most(about: str, points: Array, options: MeshOptions) -> Array:
         outside = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
         chosen.append(int(outside.argmax()))
     return points[chosen]
+
+
+def capsule_around(given: Array) -> Body:
+    """Return the least of the capsules along the principal axes of points.
+
+    Around an axis the radius is that of the least circle around the points seen along it; each end
+    is as far inside as the half ball allows.
+    """
+    hull = given[ConvexHull(given).vertices]
+    middle = hull.mean(axis=0)
+    axes = np.linalg.svd(hull - middle, full_matrices=False)[2]
+    best: tuple[float, Body] | None = None
+    for k, axis in enumerate(axes):
+        others = np.delete(axes, k, axis=0)
+        flat = (hull - middle) @ others.T
+        centre, radius = _least_circle(flat)
+        away = np.linalg.norm(flat - centre, axis=1)
+        reach, along = np.sqrt(np.maximum(radius**2 - away**2, 0)), (hull - middle) @ axis
+        low, high = float((along + reach).min()), float((along - reach).max())
+        origin = middle + centre @ others
+        if low >= high:
+            volume, body = 4 * radius**3 / 3, sphere(radius, at=origin + axis * (low + high) / 2)
+        else:
+            volume = radius**2 * (high - low) + 4 * radius**3 / 3
+            body = capsule(origin + low * axis, origin + high * axis, radius)
+        if best is None or volume < best[0]:
+            best = volume, body
+    assert best is not None
+    return best[1]
+
+
+def _least_circle(points: Array) -> tuple[Array, float]:
+    """Return centre and radius of the least circle around points: through two or three of them."""
+    from trimesh import nsphere
+
+    least: Any = nsphere.minimum_nsphere
+    centre = np.asarray(least(points)[0])
+    return centre, float(np.linalg.norm(points - centre, axis=1).max())

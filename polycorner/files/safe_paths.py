@@ -33,8 +33,17 @@ def name_of(path: str | os.PathLike[str]) -> str:
     return Path(path).name
 
 
-def within(argument: str, folder: Path, reference: str) -> Path:
+def within(argument: str, folder: Path, reference: str, start: Path | None = None) -> Path:
     """Return the file that another file refers to, by a path in a folder, links followed.
+
+    Parameters
+    ----------
+    argument : str
+    folder : Path
+        Beyond which nothing is read.
+    reference : str
+    start : Path, optional
+        The folder that a path is relative to; default ``folder``.
 
     Raises
     ------
@@ -46,8 +55,7 @@ def within(argument: str, folder: Path, reference: str) -> Path:
     strange = "\0" in reference or "\\" in reference or ":" in reference
     if not reference or strange or place.is_absolute():
         refuse(argument, expected, reference)
-    root = folder.resolve()
-    found = (root / place).resolve()
-    if not found.is_relative_to(root):
+    found = ((folder if start is None else start).resolve() / place).resolve()
+    if not found.is_relative_to(folder.resolve()):
         refuse(argument, f"{expected}, without a way out of it", reference)
     return found

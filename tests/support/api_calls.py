@@ -63,7 +63,7 @@ VALUES = {
     "Checkpoint": lambda: motion.Checkpoint(of.new("checkpoints")),
     "BasinHopping": lambda: models.basin_hopping(models.CirclesIn("square", 2), hops=1),
     "CirclesIn": lambda: models.CirclesIn("square", 2),
-    "CoordinateTable": lambda: models.read_coordinates("0.5 0.5\n0.1 0.1\n"),
+    "CoordinateTable": lambda: models.read_coordinates("x y\n0.5 0.5\n0.1 0.1\n"),
     "Condition": lambda: minimisation.Condition("holds", True, 0.5),
     "Contact": lambda: of.skeleton().contacts["left"],
     "ContactFamily": of.contact_family,
@@ -149,6 +149,7 @@ VALUES = {
     "SweepError": lambda: sweeps.SweepError("it stopped"),
     "Symmetry": of.symmetry,
     "MeshOptions": files.MeshOptions,
+    "Particles": of.particles,
     "Robot": of.arm,
     "RobotJoint": lambda: of.arm().joints["hinge"],
     "RobotLink": lambda: of.arm().links["rod"],
@@ -192,7 +193,7 @@ ALIKE = (  # arguments, and what takes them
     (
         {},
         """Arrangement.system Body.moved Certificate.explain Certificate.holds CornerList.skeleton
-        Robot.system JammedPacking.near_gaps Manifold.matrix Manifold.vector Nerve.betti
+        Robot.among Robot.system JammedPacking.near_gaps Manifold.matrix Manifold.vector Nerve.betti
         Nerve.euler_characteristic PeriodicPacking.scattered StationaryList.certificates
         TorusDisks.critical_search Trajectory.to_xarray Tutorial.sides""",
     ),
@@ -364,6 +365,7 @@ CALLS = {
     "bodies.capsule": lambda: {"start": [0.0, 0.0], "end": [1.0, 0.0], "radius": 0.5},
     "bodies.compound": lambda: {"bodies": [bodies.disc(1.0), bodies.disc(0.5)]},
     "bodies.disc": lambda: {"radius": 1.0},
+    "bodies.posed": lambda: {"robot": of.arm(), "points": [[0.1]]},
     "bodies.mass_of": lambda: {"body": of.hexagon()},
     "bodies.polygon": lambda: {"vertices": [[0, 0], [1, 0], [0, 1]]},
     "bodies.polytope": lambda: {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]},
@@ -432,6 +434,11 @@ CALLS = {
     },
     "files.load_problem": lambda: {"path": of.problem_file()},
     "files.load_skeleton": lambda: {"path": of.kept("skeleton")},
+    "files.read_urdf": lambda: {"path": of.urdf_file()},
+    "Particles.points": lambda: {"arrangement": bodies.Arrangement({"a": bodies.disc(1.0)})},
+    "CoordinateTable.points": lambda: {"manifold": polycorner.Manifold.euclidean("x y")},
+    "files.molecule": lambda: {"particles": of.particles(), "radii": {"H": 1.2}},
+    "files.read_particles": lambda: {"path": of.particle_file()},
     "files.read_mesh": lambda: {"path": of.mesh_file()},
     "files.load_trajectory": lambda: {"path": of.kept("trajectory"), "system": of.system()},
     "files.save_certificate": lambda: {"certificate": of.certificate(), "path": of.new("c.nc")},

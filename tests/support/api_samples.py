@@ -10,7 +10,17 @@ import numpy as np
 import sympy
 
 import polycorner as pc
-from polycorner import bodies, dumbbells, landscapes, models, motion, polyhedra, proofs, sweeps
+from polycorner import (
+    bodies,
+    dumbbells,
+    files,
+    landscapes,
+    models,
+    motion,
+    polyhedra,
+    proofs,
+    sweeps,
+)
 from polycorner.dumbbells import pictures as drum_pictures
 from polycorner.dumbbells.dynamics.singles import Mean
 from polycorner.dumbbells.dynamics.steady import Steady
@@ -193,6 +203,28 @@ def arm():
 def mesh_file():
     path = new("corner.obj")
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    return path
+
+
+@cache
+def particle_file():
+    path = new("some.xyz")
+    path.write_text("1\nhydrogen\nH 0 0 0\n")
+    return path
+
+
+@cache
+def particles():
+    return files.read_particles(particle_file())
+
+
+@cache
+def urdf_file():
+    path = new("arm.urdf")
+    path.write_text(
+        '<robot name="arm"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+        '<parent link="a"/><child link="b"/><limit lower="-1" upper="1"/></joint></robot>'
+    )
     return path
 
 

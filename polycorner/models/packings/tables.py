@@ -12,7 +12,7 @@ import numpy as np
 from polycorner import checks
 from polycorner.kinds import checked
 from polycorner.printing import Described
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d{1,3})?", re.ASCII)
@@ -57,6 +57,29 @@ class CoordinateTable(Checked, Described):
             checks.refuse("stop", f"columns within the {width} of the table", (start, stop))
         rows = tuple([row[start:stop] for row in self.rows])
         return CoordinateTable(rows, self.names[start:stop])
+
+    @checked
+    def points(self, manifold: Manifold) -> Array:
+        r"""Return the rows as points ``(k, N)`` of a manifold, whose coordinates are in the header.
+
+        Columns may have another order, and further ones are left out.
+
+        Raises
+        ------
+        ValueError
+            For a coordinate without a column, or with two.
+
+        Examples
+        --------
+        >>> table = read_coordinates("y,x\n0.5,2\n")
+        >>> table.points(Manifold.euclidean("x y")).tolist()
+        [[2.0, 0.5]]
+        """
+        for name in manifold.names:
+            if self.names.count(name) != 1:
+                checks.refuse("manifold", f"coordinates among {self.names}, once each", name)
+        columns = [self.names.index(name) for name in manifold.names]
+        return np.asarray(manifold.points(self.floats[:, columns]))
 
     def __repr__(self) -> str:
         """Return the size."""
