@@ -192,7 +192,7 @@ GROUPS = (
         {
             "pictures": "draw_region draw_arrangement draw_clusters draw_motion draw_packing "
             "draw_critical draw_cells draw_barcode draw_landscape draw_landscape_map "
-            "film MotionFilm film_route save save_motion",
+            "film MotionFilm film_route skeleton_page save save_motion",
         },
     ),
     Group(

@@ -199,26 +199,38 @@ def poses_of(arrangement: Any, motion: Any, argument: str = "motion") -> Poses:
     """
     instance("arrangement", arrangement, Arrangement)
     if isinstance(motion, Trajectory):
-        return _moving(arrangement, motion)
+        return _moving(argument, arrangement, motion)
     q = _points(argument, arrangement, motion)
-    return _posed(arrangement, _by_kind(arrangement, q), np.arange(len(q), dtype=np.float64))
+    return _posed(arrangement, by_kind(arrangement, q), np.arange(len(q), dtype=np.float64))
 
 
-def _moving(arrangement: Arrangement, path: Trajectory) -> Poses:
+def _moving(argument: str, arrangement: Arrangement, path: Trajectory) -> Poses:
     system: Any = path.system
     if isinstance(system, System):
         known, own = system.manifold.names, arrangement.manifold.names
         if known != own:
-            refuse("motion", f"one of the coordinates {', '.join(own)}", ", ".join(known))
-        coordinates, rates = _by_kind(arrangement, path.q), _by_kind(arrangement, path.v)
+            refuse(argument, f"one of the coordinates {', '.join(own)}", ", ".join(known))
+        places, rates = by_kind(arrangement, path.q), by_kind(arrangement, path.v)
     else:  # several kinds, each with motions of its own
         several: Any = path
-        coordinates = [several[name].q for name in arrangement.named]
+        places = [several[name].q for name in arrangement.named]
         rates = [several[name].v for name in arrangement.named]
-    found = _posed(arrangement, coordinates, path.times)
-    here = np.broadcast_to(path.present, found.present.shape)
+    return recorded(arrangement, path.times, places, rates, path.present, path.touching)
+
+
+def recorded(
+    arrangement: Arrangement,
+    times: Array,
+    places: Sequence[Array],
+    rates: Sequence[Array],
+    present: NDArray[np.bool_],
+    touching: tuple[tuple[Touch, ...], ...],
+) -> Poses:
+    """Return where bodies are in a motion, of coordinates and velocities ``(T, n, k)`` by kind."""
+    found = _posed(arrangement, places, times)
     velocities = np.concatenate([v[..., : arrangement.dimension] for v in rates], axis=1)
-    return replace(found, velocities=velocities, present=here, touching=path.touching, timed=True)
+    here = np.broadcast_to(present, found.present.shape)
+    return replace(found, velocities=velocities, present=here, touching=touching, timed=True)
 
 
 def _points(argument: str, arrangement: Arrangement, given: Any) -> Array:
@@ -233,7 +245,7 @@ def _points(argument: str, arrangement: Arrangement, given: Any) -> Array:
     return q
 
 
-def _by_kind(arrangement: Arrangement, q: Array) -> list[Array]:
+def by_kind(arrangement: Arrangement, q: Array) -> list[Array]:
     """Return the coordinates ``(T, n, k)`` of each kind."""
     if len(arrangement.placements) == 1:
         return [q]

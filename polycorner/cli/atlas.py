@@ -13,7 +13,6 @@ from polycorner.cli.search import (
     DiskSearch,
     SkeletonSearch,
     critical_sheet,
-    label,
     resume_option,
     search_options,
 )
@@ -21,14 +20,11 @@ from polycorner.cli.search import (
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from polycorner.pictures.regions import Labelled
     from polycorner.polyhedra.polyhedron import Polyhedron
-    from polycorner.skeletons.elements import Skeleton
 
     Starts = Callable[[Any], Any]
 
 STARTS = 60  # random points from which a search in the plane descends
-CROWDED = 12  # corners above which a picture is clearer without their names
 
 
 @click.group(
@@ -161,27 +157,8 @@ def planar(search: SkeletonSearch, polyhedron: "Polyhedron", starts: "Starts") -
     found = search.run(polyhedron, starts, None)
 
     def draw(folder: Path) -> list[Path]:
-        from polycorner.pictures import style
+        from polycorner.pictures import regions, style
 
-        return [style.save(region_picture(polyhedron, found), folder / f"{search.model}.png")]
+        return [style.save(regions.draw_region(found), folder / f"{search.model}.png")]
 
     search.finish(search.answer(found, {}), draw)
-
-
-def region_picture(polyhedron: "Polyhedron", found: "Skeleton", points: "Labelled" = ()) -> Any:
-    """Return the picture of a region with its corners and edges, and points with names."""
-    import numpy as np
-
-    from polycorner.pictures import regions
-    from polycorner.skeletons.search import traced
-
-    curves = [traced(found, edge) for edge in found.edges]
-    shown: Any = np.vstack([*curves, *(np.atleast_2d(point) for _, point in points)])
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    margin = 0.06 * (high - low).max()
-    crowded = len(found.corners) > CROWDED
-    corners = [
-        ("" if crowded else label(k), corner.point) for k, corner in enumerate(found.corners)
-    ]
-    window = (low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin)
-    return regions.draw_region(polyhedron, window, corners=corners, edges=curves, minima=points)

@@ -84,7 +84,7 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that the arguments name, and the arguments that are left."""
-        if args[0] in self.of_files and _name_a_problem(args[1:]):
+        if args[0] in self.of_files and (_name_a_problem(args[1:]) or _is_saved(args)):
             return args[0], everywhere(_imported(self.of_files[args[0]])), args[1:]
         try:
             return super().resolve_command(ctx, args)
@@ -105,6 +105,11 @@ def _name_a_problem(arguments: Sequence[str]) -> bool:
     """Whether one of the arguments is a problem in a file, not options in one."""
     pairs = pairwise(["", *arguments])
     return any(a.endswith(".toml") and a[0] != "-" and before != "--config" for before, a in pairs)
+
+
+def _is_saved(arguments: Sequence[str]) -> bool:
+    """Whether the first argument of ``view`` is a motion or a skeleton in a file."""
+    return arguments[0] == "view" and "".join(arguments[1:2]).lower().endswith((".nc", ".json"))
 
 
 def _loaded(point: "EntryPoint") -> click.Command:

@@ -35,6 +35,7 @@ from polycorner.cli.output import (
     write_answer,
     writing,
 )
+from polycorner.cli.saved import view_motion, view_skeleton
 from polycorner.cli.search import Begin, search_options
 
 if TYPE_CHECKING:
@@ -381,7 +382,7 @@ def _boxes(problem: "ProblemFile", file: Path) -> dict[str, Any]:
 # -------------------------------------------------------------------------------------------- view
 
 
-@command(epilog=examples("view region.toml --out region.png"))
+@command(epilog=examples("view region.toml --out region.png", "view motion.nc --out motion.gif"))
 @with_problem
 @option(
     "--out",
@@ -392,10 +393,19 @@ def _boxes(problem: "ProblemFile", file: Path) -> dict[str, Any]:
 )
 @seed_option("the random points")
 def view(file: Path, out: Path | None, seed: int) -> None:
-    """Show the region of the plane in FILE, with its corners and points.
+    """Show what is in FILE: a region, a motion of bodies or a skeleton.
 
-    For other sets, see polycorner atlas.
+    A problem, .toml, is a region of the plane, with its corners and points; for other sets, see
+    polycorner atlas.  A motion, .nc, was written by save_trajectory with its arrangement: it is a
+    page that plays, or with --out an image (.gif, .mp4) or for other programs (.glb, .gsd, .xyz).
+    A skeleton, .json, was written by save_skeleton.
     """
+    if file.suffix.lower() == ".nc":
+        view_motion(file, out)
+        return
+    if file.suffix.lower() == ".json":
+        view_skeleton(file, out)
+        return
     problem = read(file)
     if not _flat(problem):
         fail(f"{file}: expected two coordinates on lines and no equations; polycorner atlas {file}"
@@ -404,12 +414,11 @@ def view(file: Path, out: Path | None, seed: int) -> None:
         import numpy as np
 
         from polycorner import skeleton
-        from polycorner.cli.atlas import region_picture
-        from polycorner.pictures import save
+        from polycorner.pictures import draw_region, save
 
         rng = np.random.default_rng(seed)
         found = skeleton(problem.polyhedron, _inner_starts(problem, rng), rng=rng)
-        figure = region_picture(problem.polyhedron, found, [*problem.points.items()])
+        figure = draw_region(found, minima=[*problem.points.items()])
         path = out or Path(file.stem).with_suffix(".png")
         try:
             with writing(path):

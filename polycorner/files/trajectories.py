@@ -9,10 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.checks import instance, names
+from polycorner import forms
+from polycorner.bodies.arrangement import Arrangement
+from polycorner.bodies.motions import Poses, by_kind, recorded
+from polycorner.checks import increasing, instance, names, refuse
 from polycorner.container import BINARY, FileKind
+from polycorner.files.arrangements import arrangement_entry, read_arrangement
 from polycorner.files.formulas import formula_text
 from polycorner.files.motions import (
+    PARTICIPANTS,
     MotionUnits,
     column,
     load_dataset,
@@ -27,6 +32,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.motion.contacts import ContactFamily
 from polycorner.motion.system import System
+from polycorner.motion.tables import read_touches
 from polycorner.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -39,7 +45,10 @@ NOT_STATED = "not stated"
 
 
 def trajectory_dataset(
-    trajectory: Trajectory, *, units: Mapping[str, str] | None = None
+    trajectory: Trajectory,
+    *,
+    units: Mapping[str, str] | None = None,
+    arrangement: Arrangement | None = None,
 ) -> "xr.Dataset":
     """Return the trajectory of a system as an xarray dataset with units and versions.
 
@@ -50,6 +59,8 @@ def trajectory_dataset(
     units : mapping from str to str, optional
         Units of ``time`` (default s), ``energy``, ``force``, ``impulse`` and ``gap`` (default that
         of the contacts' functions); those of coordinates are the manifold's.
+    arrangement : Arrangement, optional
+        Whose system moved: it is kept as an attribute.
 
     Returns
     -------
@@ -61,6 +72,7 @@ def trajectory_dataset(
     import xarray as xr
 
     system = _system(trajectory)
+    told = {} if arrangement is None else _arrangement(arrangement, system)
     names("units", units or {}, OTHERS)
     gaps = {f.unit for f in system.polyhedron.functions if f.unit}
     known = {"time": "s", "gap": gaps.pop() if len(gaps) == 1 else NOT_STATED}
@@ -78,7 +90,7 @@ def trajectory_dataset(
         data | motion_data(trajectory, system.bodies.contact_names, motion),
         motion_coordinates(trajectory, motion)
         | {"coordinate": list(system.manifold.names), "gap": list(system.contacts)},
-        _attributes(trajectory, system),
+        _attributes(trajectory, system) | told,
     )
 
 
@@ -88,6 +100,7 @@ def save_trajectory(
     path: str | os.PathLike[str],
     *,
     units: Mapping[str, str] | None = None,
+    arrangement: Arrangement | None = None,
 ) -> Path:
     """Write the trajectory of a system as NetCDF, atomically.
 
@@ -99,6 +112,8 @@ def save_trajectory(
         The file; its folder is created if it does not exist.
     units : mapping from str to str, optional
         See :func:`trajectory_dataset`.
+    arrangement : Arrangement, optional
+        Whose system moved: ``polycorner view FILE`` shows its bodies.
 
     Returns
     -------
@@ -112,7 +127,9 @@ def save_trajectory(
     OSError
         If the file cannot be written.
     """
-    return save_dataset(KIND, path, trajectory_dataset(trajectory, units=units))
+    return save_dataset(
+        KIND, path, trajectory_dataset(trajectory, units=units, arrangement=arrangement)
+    )
 
 
 @checked
@@ -144,6 +161,52 @@ def load_trajectory(path: str | os.PathLike[str], system: System) -> Trajectory:
     if isinstance(found, str):
         raise KIND.refusal(path, f"is of another system: {found}")
     return found
+
+
+def saved_poses(path: str | os.PathLike[str]) -> Poses:
+    """Return where bodies are in a motion that was written with its arrangement.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If the file is no trajectory, was changed, or has no arrangement.
+    """
+    found = load_dataset(KIND, path, _read_poses)
+    if found is None:
+        raise KIND.refusal(path, "has no bodies, as save_trajectory(..., arrangement=...) keeps")
+    return found
+
+
+def _read_poses(content: "xr.Dataset") -> Poses | None:
+    if "arrangement" not in content.attrs:
+        return None
+    arrangement = read_arrangement("arrangement", json.loads(content.attrs["arrangement"]))
+    contacts = forms.many(forms.text)("contacts", json.loads(content.attrs["contacts"]))
+    T, N = content["present"].shape
+    if N > 1 and len(arrangement.named) > 1:
+        refuse("arrangement", "one body, which is repeated", [*arrangement.named])
+
+    def of(name: str, *shape: int, kind: str = "f", **limits: Any) -> Any:
+        return forms.array(name, np.array(content[name].values), kind, shape, **limits)
+
+    q, v = (of(name, T, N, arrangement.manifold.size) for name in ("q", "v"))
+    present = of("present", T, N, kind="i", least=0, most=1) != 0
+    columns = [of(f"touch_{name}", -1, kind="i") for name in ("instant", *PARTICIPANTS)]
+    table = {
+        "touch": np.stack(columns, axis=1).astype(np.int64),
+        "touch_force": of("touch_force", -1),
+    }
+    touching = tuple(read_touches(table, contacts, T, N))
+    both = by_kind(arrangement, q), by_kind(arrangement, v)
+    times = increasing("time", content["time"].values)
+    return recorded(arrangement, times, *both, present, touching)
+
+
+def _arrangement(arrangement: Arrangement, system: System) -> dict[str, str]:
+    known, own = system.manifold.names, instance("arrangement", arrangement, Arrangement)
+    if own.manifold.names != known:
+        refuse("arrangement", f"one of the coordinates {', '.join(known)}", own.manifold.names)
+    return {"arrangement": json.dumps(arrangement_entry(own))}
 
 
 def _system(trajectory: Trajectory) -> System:

@@ -1,15 +1,17 @@
 from .arrangements import draw_arrangement
 from .barcodes import draw_barcode
-from .clusters import draw_clusters, draw_motion
+from .clusters import draw_clusters
 from .disks import draw_critical
 from .exports import save_motion
 from .landscape_maps import draw_landscape_map
 from .landscapes import draw_landscape
 from .motion_films import MotionFilm, film
+from .motion_strips import draw_motion
 from .packings import draw_packing
 from .parameter_boxes import draw_cells
 from .regions import draw_region
 from .route_films import film_route
+from .skeleton_pages import skeleton_page
 from .solids import (
     Isosurface,
     SharpSurface,
@@ -48,6 +50,7 @@ __all__ = [
     "save",
     "save_motion",
     "sharp_surface",
+    "skeleton_page",
     "visible",
     "write_mesh",
 ]

@@ -1,11 +1,14 @@
-"""Arguments of figures: points, polylines with labels, and faces of meshes."""
+"""Arguments of figures: points, polylines with labels, and points along these."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from polycorner.checks import reals, refuse
+from polycorner.polyhedra.faces import project
+from polycorner.polyhedra.polyhedron import Polyhedron
+from polycorner.polyhedra.quotients import Quotient
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 
@@ -56,3 +59,23 @@ def several(argument: str, given: Any) -> Iterable[Any]:
     if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
         refuse(argument, "a sequence", given, TypeError)
     return given
+
+
+def sampled(
+    polyhedron: Polyhedron, line: Array, rows: Sequence[int], count: int
+) -> tuple[Array, Array]:
+    """Return points of a polyline ``(k, n)`` at equal steps of arc length, and the arc lengths.
+
+    Lengths are in units of the scales.  A point of a chord is off an edge by the sagitta; Newton
+    steps close the functions of the rows again.
+    """
+    scales = polyhedron.manifold.scale_array
+    steps = np.linalg.norm(np.diff(line, axis=0) / scales, axis=1)
+    lengths = np.concatenate([[0.0], np.cumsum(steps)])
+    moments = np.linspace(0, lengths[-1], count)
+    places = np.stack([np.interp(moments, lengths, column) for column in line.T], axis=-1)
+    places = np.asarray(polyhedron.manifold.onto(places))
+    quotient = Quotient(polyhedron)
+    for k in range(1, count - 1):
+        places[k] = project(quotient, places[k], rows).point.q
+    return places, moments

@@ -86,26 +86,47 @@ def draw_arrangement(
         contacts.
     """
     poses = poses_of(arrangement, points, "points")
-    count, d = len(poses), arrangement.dimension
+    count = len(poses)
     if titles is not None and len(titles) != count:
         refuse("titles", f"{count} titles, one for each point", len(titles))
-    columns = min(whole("columns", columns, least=1), count)
     marks = _marks(poses, points, contacts)
-    pushes = None if forces is None else finite(arguments.points("forces", forces, d), "forces")
-    if pushes is not None and (count > 1 or pushes.shape != marks[0].shape):
-        refuse("forces", "one for each of the contacts of a single picture", forces)
+    pushes = None
+    if forces is not None:
+        pushes = finite(arguments.points("forces", forces, arrangement.dimension), "forces")
+        if count > 1 or pushes.shape != marks[0].shape:
+            refuse("forces", "one for each of the contacts of a single picture", forces)
+    columns = min(whole("columns", columns, least=1), count)
+    named = count == 1 and len(poses.kinds) <= MOST_NAMES if names is None else names
+    framed = count == 1 if axes is None else axes
+    return grid_of(poses, marks, titles, columns, framed=framed, named=named, forces=pushes)
+
+
+def grid_of(
+    poses: Poses,
+    marks: Sequence[Array],
+    titles: Sequence[str] | None,
+    columns: int,
+    *,
+    framed: bool = False,
+    named: bool = False,
+    forces: Array | None = None,
+) -> Figure:
+    """Draw bodies at each instant side by side at the same scale, with marks ``(m, d)``."""
+    count, space = len(poses), poses.arrangement.dimension == 3
     rows, cell = math.ceil(count / columns), ALONE if count == 1 else CELL
     window = window_of(poses)
-    figure = Figure(figsize=(cell * columns, (cell + 0.2) * rows), layout="constrained")
-    space = {"projection": "3d", "computed_zorder": False} if d == 3 else {}
-    grid = figure.subplots(rows, columns, squeeze=False, subplot_kw=space)
-    named = count == 1 and len(poses.kinds) <= MOST_NAMES if names is None else names
+    lines = 0.2 + 0.25 * max((title.count("\n") for title in titles or ()), default=0)
+    figure = Figure(figsize=(cell * columns, (cell + lines) * rows), layout="constrained")
+    kind = {"projection": "3d", "computed_zorder": False} if space else {}
+    grid = figure.subplots(rows, columns, squeeze=False, subplot_kw=kind)
     for k, pane in enumerate(grid.flat):
-        framed = k < count and (count == 1 if axes is None else axes)
-        pane.set_axis_off() if not framed else _label(pane, arrangement)
+        if k >= count or not framed:
+            pane.set_axis_off()
+        else:
+            _label(pane, poses.arrangement)
         if k < count:
-            (draw_space if d == 3 else draw_plane)(pane, poses, k, window)
-            _annotate(pane, poses.placed(k) if named else {}, marks[k], pushes, window)
+            (draw_space if space else draw_plane)(pane, poses, k, window)
+            _annotate(pane, poses.placed(k) if named else {}, marks[k], forces, window)
             if titles is not None:
                 pane.set_title(titles[k], fontsize=9)
     return figure

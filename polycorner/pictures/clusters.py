@@ -12,11 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path
 from numpy.typing import ArrayLike
 
-from polycorner.checks import instance, reals, refuse, whole
+from polycorner.checks import instance, reals, refuse
 from polycorner.kinds import checked
 from polycorner.models.spheres import SphereCluster
-from polycorner.polyhedra.faces import project
-from polycorner.polyhedra.quotients import Quotient
+from polycorner.pictures.arguments import sampled
 from polycorner.spaces.arguments import finite
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -84,33 +83,14 @@ def draw_clusters(
     return figure
 
 
-@checked
-def draw_motion(model: SphereCluster, polyline: ArrayLike, frames: int = 6) -> Figure:
-    """Draw frames of a one-dimensional motion, from one end to the other by arc length.
-
-    Contacts that persist have dark bars; contacts that open at the beginning or close at the end
-    have bars of another colour there and are named in the caption.
-
-    Parameters
-    ----------
-    model : SphereCluster
-        The number of spheres.
-    polyline : (k, 3 n) array
-        Points along an edge, at least two, as in ``Edge.polyline``.
-    frames : int, optional
-        Number of pictures, at least 2.
-
-    Raises
-    ------
-    TypeError, ValueError
-        For a model, polyline or number of frames of another form.
-    """
+def cluster_strip(model: SphereCluster, polyline: ArrayLike, frames: int) -> Figure:
+    """Draw frames of a motion of a cluster; see :func:`draw_motion`."""
     line = _clusters(model, "polyline", polyline)
     if len(line) < 2:
         refuse("polyline", "at least two points", len(line))
-    frames = whole("frames", frames, least=2)
     held = set.intersection(*(set(_touching(model, q)) for q in line))
-    places, moments = _sampled(model, line, held, frames)
+    rows = [model.pairs.index(pair) for pair in sorted(held)]
+    places, moments = sampled(model.polyhedron, line, rows, frames)
     opening, closing = (sorted(set(_touching(model, q)) - held) for q in (line[0], line[-1]))
     events = {0: (opening, OPENING, "opening"), frames - 1: (closing, CLOSING, "closing")}
     shown = [(k, pair) for k, (changed, *_) in events.items() for pair in changed]
@@ -171,24 +151,6 @@ def _turn(a: float, b: float) -> Array:
     up = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
     across = np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]])
     return np.asarray(across @ up)
-
-
-def _sampled(
-    model: SphereCluster, line: Array, held: Iterable[Pair], frames: int
-) -> tuple[Array, Array]:
-    """Return points of an edge at equal steps of arc length, and the arc lengths.
-
-    A point of a chord is off the edge by the sagitta; Newton steps close the contacts again.
-    """
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    lengths = np.concatenate([[0.0], np.cumsum(steps)])
-    moments = np.linspace(0, lengths[-1], frames)
-    places = np.stack([np.interp(moments, lengths, column) for column in line.T], axis=-1)
-    quotient = Quotient(model.polyhedron)
-    rows = [model.pairs.index(pair) for pair in sorted(held)]
-    for k in range(1, frames - 1):
-        places[k] = project(quotient, places[k], rows).point.q
-    return places, moments
 
 
 # ----------------------------------------------------------------------------------------- drawing

@@ -71,7 +71,12 @@ def save_motion(arrangement: Arrangement, motion: Motion, path: str | os.PathLik
     >>> print(file.read_text().splitlines()[2])
     A 0 0 0 0 0 0 1 0.5
     """
-    poses, suffix = poses_of(arrangement, motion), Path(path).suffix.lower()
+    return write_poses(poses_of(arrangement, motion), path)
+
+
+def write_poses(poses: Poses, path: str | os.PathLike[str]) -> Path:
+    """Write where bodies are, see :func:`save_motion`."""
+    suffix = Path(path).suffix.lower()
     if suffix not in WRITERS:
         refuse("path", f"a file name that ends in {listed(sorted(WRITERS))}", os.fspath(path))
     return WRITERS[suffix](poses, Path(path))

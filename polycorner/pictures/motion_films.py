@@ -239,14 +239,28 @@ def film(
     >>> len(shown.poses), shown.page[:15]
     (26, '<!DOCTYPE html>')
     """
-    made = MotionFilm(
-        poses_of(arrangement, motion),
+    poses = poses_of(arrangement, motion)
+    made = film_of(poses, fps=fps, speed=speed, size=size, contacts=contacts, title=title)
+    if path is not None:
+        made.save(path)
+    return made
+
+
+def film_of(
+    poses: Poses,
+    *,
+    fps: int = RATE,
+    speed: float = 1.0,
+    size: int = SIZE,
+    contacts: bool = True,
+    title: str = "",
+) -> MotionFilm:
+    """Return a film of bodies whose places are known; see :func:`film`."""
+    return MotionFilm(
+        poses,
         whole("fps", fps, least=1),
         real("speed", speed, above=0),
         whole("size", size, least=16),
         contacts,
         title,
     )
-    if path is not None:
-        made.save(path)
-    return made

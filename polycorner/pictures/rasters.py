@@ -20,7 +20,7 @@ FINE = 2  # pixels computed for each one that is shown, along each side
 ELEVATION, AZIMUTH = math.radians(20), math.radians(-60)  # of the eye
 LIGHT = np.array([-0.45, 0.7, 0.9]) / math.hypot(0.45, 0.7, 0.9)  # right, up, towards the eye
 BAND = 0.06  # half the width of the band around a ball that turns, in radii
-DARK = 0.45  # brightness out of the light, and of a band
+DARK = 0.45  # brightness out of the light, which is that of a band
 
 
 class Raster:
@@ -100,11 +100,11 @@ class Raster:
         rows, columns = self._box(centre[None, :2], radius)
         x, y = self.x[columns] - centre[0], self.y[rows, None] - centre[1]
         height = np.sqrt(np.maximum(radius**2 - x**2 - y**2, 0.0))
-        normal = np.stack(np.broadcast_arrays(x, y, height), axis=-1) / radius
-        paint = np.broadcast_to(tint, normal.shape)
+        light = (x * LIGHT[0] + y * LIGHT[1] + height * LIGHT[2]) / radius
         if axis is not None:
-            paint = np.where(abs(normal @ axis)[..., None] < BAND, DARK * tint, paint)
-        self._paint(rows, columns, height > 0, centre[2] + height, normal, paint)
+            across = (x * axis[0] + y * axis[1] + height * axis[2]) / radius
+            light = np.where(abs(across) < BAND, -1.0, light)
+        self._paint(rows, columns, height > 0, centre[2] + height, light, tint)
 
     def _tube(self, one: Array, two: Array, radius: float, tint: Array) -> None:
         along = two - one
@@ -122,8 +122,8 @@ class Raster:
         root = b**2 - slant * ((away**2).sum(axis=-1) - radius**2)
         z = (np.sqrt(np.maximum(root, 0.0)) - b) / slant
         share = w @ u + z * u[2]
-        normal = (away + z[..., None] * sight) / radius
-        self._paint(rows, columns, (root > 0) & (share >= 0) & (share <= length), z, normal, tint)
+        light = (away @ LIGHT + z * (sight @ LIGHT)) / radius
+        self._paint(rows, columns, (root > 0) & (share >= 0) & (share <= length), z, light, tint)
 
     def _face(self, corners: Array, normal: Array, radius: float, tint: Array) -> None:
         """Draw a face that looks to the eye, moved outwards by a radius."""
@@ -137,7 +137,7 @@ class Raster:
             moved[0, 2]
             - (normal[0] * (x - moved[0, 0]) + normal[1] * (y - moved[0, 1])) / normal[2]
         )
-        self._paint(rows, columns, inside, z, np.broadcast_to(normal, (*x.shape, 3)), tint)
+        self._paint(rows, columns, inside, z, np.full(x.shape, normal @ LIGHT), tint)
 
     def _at(self, axis: int, places: Array) -> NDArray[np.int64]:
         start = (self.x, self.y)[axis][0]
@@ -153,12 +153,12 @@ class Raster:
         return rows, columns
 
     def _paint(
-        self, rows: slice, columns: slice, seen: NDArray[np.bool_], z: Array, normal: Array,
+        self, rows: slice, columns: slice, seen: NDArray[np.bool_], z: Array, light: Array,
         tint: Array,
     ) -> None:  # fmt: skip
-        depth, colour = self.depth[rows, columns], self.colour[rows, columns]
+        """Colour the pixels that are seen and nearer; ``light`` is the cosine to the lamp."""
+        depth = self.depth[rows, columns]
         nearer = seen & (z > depth)
-        lit = DARK + (1 - DARK) * np.clip(normal[nearer] @ LIGHT, 0, 1)
-        paint = np.broadcast_to(tint, colour.shape)[nearer]
+        lit = DARK + (1 - DARK) * np.clip(light[nearer], 0, 1)
         depth[nearer] = z[nearer]
-        colour[nearer] = lit[:, None] * paint
+        self.colour[rows, columns][nearer] = lit[:, None] * tint

@@ -13,6 +13,7 @@ from matplotlib.colors import to_rgb
 
 from polycorner import skeleton
 from polycorner.models.spheres import SphereCluster
+from polycorner.pictures.arguments import sampled
 from polycorner.pictures.clusters import (
     BALL,
     BAR,
@@ -21,14 +22,14 @@ from polycorner.pictures.clusters import (
     RADIUS,
     SINGULAR_BALL,
     THICKNESS,
-    _sampled,
     _turned,
     draw_clusters,
-    draw_motion,
 )
+from polycorner.pictures.motion_strips import draw_motion
 from polycorner.pictures.style import save
 
 DPI = 150  # of files that are saved
+HELD = [SphereCluster(3).pairs.index(pair) for pair in ((0, 2), (1, 2))]  # of a hinge
 
 
 def atlas(count):
@@ -235,14 +236,14 @@ def test_frames_are_equal_steps_of_arc_length():
     model, exact = SphereCluster(3), 4 * math.pi / 3 * np.linspace(0, 1, 6)
     axes = draw_motion(model, hinge(200)).axes
     assert [a.get_title().split("\n")[0] for a in axes] == [f"{s:.2f}" for s in exact]
-    places, moments = _sampled(model, hinge(200), {(0, 2), (1, 2)}, 6)
+    places, moments = sampled(model.polyhedron, hinge(200), HELD, 6)
     np.testing.assert_allclose(moments, exact, rtol=1e-3)
     np.testing.assert_allclose(places, hinge(6), atol=1e-3)
 
 
 @pytest.mark.parametrize("points", [3, 4, 9])
 def test_frames_between_points_of_a_coarse_polyline_lie_on_the_edge(points):
-    places, _ = _sampled(SphereCluster(3), hinge(points), {(0, 2), (1, 2)}, 8)
+    places, _ = sampled(SphereCluster(3).polyhedron, hinge(points), HELD, 8)
     for q in places[1:-1]:
         assert touching(q) == {"1-3", "2-3"}
         a, b, c = q.reshape(3, 3)

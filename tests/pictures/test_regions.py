@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
-from polycorner import AllOf, AnyOf, Manifold, Polyhedron
+from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
 from polycorner.models.tutorial import Tutorial
 from polycorner.pictures.regions import MINIMA, SHADE, draw_region
 from polycorner.pictures.style import save
@@ -137,3 +137,63 @@ def test_a_view_without_boundary_is_drawn_too(tmp_path):
     for bounds in ((0.2, 0.4, 0.2, 0.4), (5, 6, 5, 6)):
         path = save(draw_region(ELL, bounds, resolution=20), tmp_path / "part.png")
         assert path.read_bytes().startswith(b"\x89PNG")
+
+
+# ------------------------------------------------------------------------------------- skeletons
+
+ONE, TWO = (X + 1) ** 2 + Y**2 - 1, (X - 1) ** 2 + Y**2 - 1
+TOUCHING = {
+    "two discs outside": ({"one": ONE, "two": TWO, "rim": 6 - X**2 - Y**2}, (0, 0)),
+    "a crescent": ({"rim": 4 - X**2 - Y**2, "two": TWO}, (2, 0)),
+    "a cusp": ({"floor": Y, "curve": X**2 - Y, "left": X, "right": 2 - X}, (0, 0)),
+    "a thin cusp": ({"floor": Y, "curve": X**3 - Y, "right": 2 - X}, (0, 0)),
+}
+
+
+@pytest.mark.parametrize("name", TOUCHING)
+def test_corners_where_sides_touch_are_shown_as_such(name):
+    functions, touching = TOUCHING[name]
+    figure = draw_region(
+        Polyhedron(PLANE, functions), (-3, 3, -3, 4), corners=[("T", touching)], resolution=100
+    )
+    (mark,) = [line for line in figure.axes[0].lines if line.get_linestyle() == "None"]
+    assert mark.get_marker() == "D"
+    assert mark.get_markerfacecolor() not in ("black", "white")
+    np.testing.assert_array_equal(mark.get_xydata(), [touching])
+
+
+@pytest.mark.parametrize("name", TOUCHING)
+def test_the_name_of_a_tangential_corner_is_outside(name):
+    functions, touching = TOUCHING[name]
+    region = Polyhedron(PLANE, functions)
+    figure = draw_region(region, (-3, 3, -3, 4), corners=[("T", touching)], resolution=100)
+    canvas, _ = rendered(figure)
+    (text,) = figure.axes[0].texts
+    box = text.get_window_extent(canvas.get_renderer())
+    middle = (
+        figure.axes[0]
+        .transData.inverted()
+        .transform([(box.x0 + box.x1) / 2, (box.y0 + box.y1) / 2])
+    )
+    assert not region.contains(middle)
+
+
+def test_a_skeleton_labels_itself():
+    rng = np.random.default_rng(0)
+    found = skeleton(ELL, np.array([[0.5, 0.5]]), rng=rng)
+    axes = draw_region(found, resolution=100).axes[0]
+    left, right = axes.get_xlim()
+    assert left < 0
+    assert right > 2
+    seen = {text.get_text(): text.xy for text in axes.texts}
+    for k, corner in enumerate(found.corners):
+        np.testing.assert_array_equal(seen[f"C{k}"], corner.point)
+    assert {text for text in seen if text[0] == "f"} == {f"f{k}" for k in range(1, 7)}
+    # A full circle for each convex corner, a hollow one for the other.
+    marks = [line for line in axes.lines if line.get_linestyle() == "None"]
+    assert [len(line.get_xydata()) for line in marks] == [5, 1]
+
+
+def test_a_polyhedron_needs_bounds_and_a_skeleton_does_not():
+    with pytest.raises(ValueError, match="bounds: expected left, right, bottom and top"):
+        draw_region(ELL)

@@ -225,6 +225,7 @@ DUMBBELLS = {
         "path": of.new("motion.xyz"),
     },
     "pictures.sharp_surface": lambda: {"gaps": of.gaps, "bounds": of.AROUND, "resolution": 8},
+    "pictures.skeleton_page": lambda: {"found": of.skeleton()},
     "pictures.visible": lambda: {
         "mesh": of.isosurface().mesh,
         "points": [[0.0, 0.0, 2.0]],

@@ -51,7 +51,7 @@ class Player {
     this.film = film;
     this.stage = stage;
     this.at = -1;
-    const labels = ["Contacts", ...film.labels, ...film.energies.map(([name]) => name)];
+    const labels = [film.marks ?? "Contacts", ...film.labels, ...film.energies.map(([name]) => name)];
     const values = rows(labels);
     this.contacts = values[0];
     this.words = values.slice(1, 1 + film.labels.length);

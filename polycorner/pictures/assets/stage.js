@@ -165,7 +165,8 @@ class Stage {
     for (const [k, thing] of film.still.entries()) {
       for (const mesh of await this.meshes({ ...thing, most: 1 })) this.put(`still ${k} ${mesh.name}`, mesh);
     }
-    for (const [k, line] of film.lines.entries()) this.lines(`line ${k}`, [...(await floats(line))]);
+    for (const [k, line] of film.lines.entries()) this.lines(`line ${k}`, [...(await floats(line))], film.tone);
+    if (film.axes) this.axes(film.axes.names, film.axes.origin, film.axes.length);
     if (!this.works || !film.flat) return;
     this.controls.noRotate = true; // the plane is seen from above; dragging moves it
     this.controls.mouseButtons = { LEFT: THREE.MOUSE.PAN, MIDDLE: THREE.MOUSE.DOLLY, RIGHT: THREE.MOUSE.PAN };
@@ -244,10 +245,10 @@ class Stage {
     }
   }
 
-  lines(name, numbers) {
+  lines(name, numbers, tone = "grid") {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(numbers, 3));
-    this.put(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: this.colour("grid") })));
+    this.put(name, new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: this.colour(tone) })));
   }
 
   // Three arrows of a length from a point, with their names at the ends.
@@ -260,7 +261,8 @@ class Stage {
       ends.push(...origin, ...end);
       const sprite = this.letter(name);
       sprite.position.fromArray(end.map((value, j) => value + (j === k ? 0.22 * length : 0)));
-      sprite.scale.setScalar(0.42 * length);
+      const { width, height } = sprite.material.map.image;
+      sprite.scale.set((0.42 * length * width) / height, 0.42 * length, 1);
       group.add(sprite);
     });
     const geometry = new THREE.BufferGeometry();
@@ -270,11 +272,11 @@ class Stage {
   }
 
   letter(text) {
-    const canvas = Object.assign(document.createElement("canvas"), { width: 96, height: 96 });
+    const canvas = Object.assign(document.createElement("canvas"), { width: 48 + 40 * Math.max(text.length, 1.2), height: 96 });
     const pen = canvas.getContext("2d");
     Object.assign(pen, { font: "italic 64px serif", textAlign: "center", textBaseline: "middle" });
     pen.fillStyle = this.style("ink");
-    pen.fillText(text, 48, 48);
+    pen.fillText(text, canvas.width / 2, 48);
     const map = new THREE.CanvasTexture(canvas);
     map.encoding = THREE.sRGBEncoding;
     const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false }));
