@@ -14,6 +14,7 @@ from scenes import FRICTION, GRAVITY, Scene, Shape
 from polycorner.spaces.manifold import Array
 
 MOST_SWEEPS = 100  # of MuJoCo's solver
+STEPS_A_CALL = 10
 
 
 class Moved(NamedTuple):
@@ -147,7 +148,13 @@ def our_body(shape: Shape) -> Any:
 
 
 class MujocoEngine(Engine):
-    """Moved by MuJoCo, by Newton's method; bodies in the plane have two slides and a hinge."""
+    """Moved by MuJoCo, by Newton's method; bodies in the plane have two slides and a hinge.
+
+    Contacts are as stiff as the step allows, and friction cones are round.
+    """
+
+    option = f'cone="elliptic" integrator="implicitfast" iterations="{MOST_SWEEPS}" impratio="10"'
+    stiffness = 2.0  # time constant of contacts over the step; MuJoCo accepts no less
 
     def build(self) -> None:
         """Compile the document."""
@@ -159,14 +166,12 @@ class MujocoEngine(Engine):
         """Return the scene as an MJCF document."""
         walls = "\n".join(self._wall(k) for k in range(len(self.scene.walls)))
         bodies = self._arm(0) if self.scene.hinges else "\n".join(map(self._one, self._numbers()))
-        # The least time constant that MuJoCo accepts.
+        solref = f'solref="{text(self.stiffness * self.dt, 1)}"' if self.stiffness else ""
         return f"""<mujoco>
   <compiler angle="radian"/>
-  <option timestep="{text(self.dt)}" gravity="{text(0, 0, -GRAVITY)}" cone="elliptic"
-          integrator="implicitfast" iterations="{MOST_SWEEPS}" impratio="10"/>
+  <option timestep="{text(self.dt)}" gravity="{text(0, 0, -GRAVITY)}" {self.option}/>
   <size memory="200M"/>
-  <default><geom solref="{text(2 * self.dt, 1)}" condim="3" friction="{text(FRICTION, 0, 0)}"/>
-  </default>
+  <default><geom {solref} condim="3" friction="{text(FRICTION, 0, 0)}"/></default>
   <worldbody>
 {walls}
 {bodies}
@@ -219,11 +224,16 @@ class MujocoEngine(Engine):
         moved, every = Moved([], []), max(1, steps // records)
         for done in range(0, steps + 1, every):
             self._record(moved)
-            self.mujoco.mj_step(self.model, self.data, min(every, steps - done))
+            self._advance(min(every, steps - done))
         if self.data.warning.number.any():
             msg = f"MuJoCo warned, so often of each kind: {self.data.warning.number.tolist()}"
             raise RuntimeError(msg)
         return moved
+
+    def _advance(self, steps: int) -> None:
+        # A few steps a call, between which Python can end what takes too long.
+        for done in range(0, steps, STEPS_A_CALL):
+            self.mujoco.mj_step(self.model, self.data, min(STEPS_A_CALL, steps - done))
 
     def _record(self, moved: Moved) -> None:
         self.mujoco.mj_forward(self.model, self.data)
@@ -240,6 +250,12 @@ class MujocoEngine(Engine):
             self.mujoco.mj_objectVelocity(self.model, self.data, kind, k + 1, row, 0)
         moved.q.append(np.column_stack([places, turns]))
         moved.v.append(np.column_stack([rates[:, [3, 5]], -rates[:, 1]]))
+
+
+class MujocoDefault(MujocoEngine):
+    """The same with MuJoCo's defaults, which are softer and faster."""
+
+    option, stiffness = "", 0.0
 
 
 def _in_space(point: Array) -> Array:
@@ -327,5 +343,6 @@ class PymunkEngine(Engine):
 ENGINES: dict[str, type[Engine]] = {
     "polycorner": Ours,
     "MuJoCo": MujocoEngine,
+    "MuJoCo, defaults": MujocoDefault,
     "Pymunk": PymunkEngine,
 }

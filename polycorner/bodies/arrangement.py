@@ -18,8 +18,9 @@ from polycorner.bodies.dynamics import (
     between,
     energies,
     friction_of,
+    listed_hulls,
     masses_of,
-    smooth,
+    rubbing_hulls,
     twins,
 )
 from polycorner.bodies.joints import WORLD, AnyJoint
@@ -29,7 +30,7 @@ from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.mechanisms import Mechanism, check_joints, closed, completed, moved_along
 from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
-from polycorner.bodies.pairs import Tree, apart, distances, members
+from polycorner.bodies.pairs import Tree, apart, both_sharp, distances, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
 from polycorner.bodies.scenes import BodiesInSpace
 from polycorner.bodies.several import assembly
@@ -278,15 +279,16 @@ class Arrangement(Checked, Printed):
         """The formulas of joints."""
         return Mechanism(self.joints, self.placements)
 
-    def contacts(self, *, excluded: bool) -> list[Tree]:
-        """Return the and/or trees of all pairs of parts, and the gaps at walls.
+    def contacts(self, *, excluded: bool, sharp: bool = True) -> list[Tree]:
+        """Return the and/or trees of pairs of parts, of ``sharp`` ones too, and the gaps at walls.
 
         ``excluded`` says whether rounded parts that cross each other are excluded as well, by
         unions that are never active.
         """
-        found = [apart(self.manifold, *pair, excluded=excluded) for pair in self.pairs]
+        pairs = [pair for pair in self.pairs if sharp or not both_sharp(*pair)]
+        found = [apart(self.manifold, *pair, excluded=excluded) for pair in pairs]
         found += [touch.gap for touch in self.at_walls]
-        if not (found or self.joints):
+        if not (found or self.joints or (self.pairs and not sharp)):
             refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
         return together(found)
 
@@ -370,8 +372,7 @@ class Arrangement(Checked, Printed):
         Raises
         ------
         NotImplementedError
-            For two sharp polygons or polyhedra that are listed or fixed, and for rolling that is
-            not covered.
+            For images of sharp bodies that are listed, and for rolling that is not covered.
 
         Examples
         --------
@@ -400,8 +401,14 @@ class Arrangement(Checked, Printed):
         holders = [WORLD, *self.fixed, *self.named]
         of_joints = self.mechanism, self.manifold, holders
         laws, moved = driven(*of_joints, laws, drives, forces, rubbing_joints)
-        touches = [touch for pair in self.pairs for touch in distances(self.manifold, *pair)]
+        touches, hulls = [], []
+        for pair in self.pairs:
+            if both_sharp(*pair):
+                hulls.append((listed_hulls(*pair, self.scale), pair))
+            else:
+                touches += distances(self.manifold, *pair)
         meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
+        meetings += [Meeting(n, a.body, b.body) for one, (a, b) in hulls for n in one.names]
         meetings += [Meeting(t.gap.name, t.member.body, t.name) for t in self.at_walls]
         meetings += [Meeting(end, *[end.rpartition(".")[0]] * 2) for end in self.mechanism.limits]
         family, first = None, self.placements[0]
@@ -414,17 +421,20 @@ class Arrangement(Checked, Printed):
         single = len(self.placements) == 1
         free = single and self.lattice.axes and not (self.pairs or self.at_walls)
         lone = own_image(self.lattice, first) if free else {}
-        joined = None if lone else self._joined(self.contacts(excluded=False))
-        placed = smooth(joined or Polyhedron(self.manifold, lone))
+        parts = None if lone else self.contacts(excluded=False, sharp=False)
+        placed = Polyhedron(self.manifold, lone) if parts is None else self._joined(parts)
+        rubbing = tuple(rubbing_hulls(one, *pair, known) for one, pair in hulls)
+        every = [*placed.names, *(name for one in rubbing for name in one.names)]
         return System(
             placed,
             *laws,
             friction_of(self.manifold, touches, self.at_walls, known.friction, known.rolling)
             + moved,
-            restitution={f.name: known.restitution.get(f.name, 0.0) for f in placed.functions},
+            restitution={name: known.restitution.get(name, 0.0) for name in every},
             count=count,
             between=family,
             exits={} if exits is None else exits,
+            hulls=rubbing,
             scene=BodiesInSpace(
                 self.placements,
                 tuple(touches),
@@ -432,6 +442,7 @@ class Arrangement(Checked, Printed):
                 frozenset(self.walls),
                 count,
                 partial(twins, (first, first), self.lattice),
+                {n: (a.body, b.body) for one, (a, b) in hulls for n in one.names},
             ),
         )
 

@@ -41,7 +41,6 @@ from polycorner.motion.friction import Disc, Interval
 from polycorner.motion.hulls.contacts import Hull, HullContacts
 from polycorner.motion.noise import OPTIONS
 from polycorner.motion.rotations import rotational_energy
-from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
 
@@ -255,12 +254,20 @@ def _check_turning(argument: str, rubbing: list[PlacedPart], given: Any) -> None
             refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
+def is_sharp_in_space(*placements: Placement) -> bool:
+    """Whether bodies are polyhedra none of which is rounded."""
+    parts = [part for p in placements for part in p.body.parts.values()]
+    return all(part.radius == 0 and part.dimension == 3 for part in parts)
+
+
 def twins(
     placements: tuple[Placement, Placement], lattice: Lattice
 ) -> tuple[tuple[Placement, ...], list[Touch]]:
     """Return two bodies like given ones, called after these with 1 and 2, and their contacts."""
     named = [(p, f"{p.name}{k}") for p, k in zip(placements, PAIR, strict=True)]
     pair = tuple(replace(p, name=name, manifold=_renamed(p, name)) for p, name in named)
+    if is_sharp_in_space(*placements):
+        return pair, []  # those of hulls have no formulas
     space = pair[0].manifold * pair[1].manifold
     meeting = pairs(lattice, pair, {})
     return pair, [t for parts in meeting for t in distances(space, *parts)]
@@ -274,7 +281,7 @@ def between(
     The two, which may be the same, are called after these, with 1 and 2, and so are their
     coordinates.  In a periodic box the second is the nearest image.
     """
-    if all(is_sharp(part) for p in placements for part in p.body.parts.values()):
+    if all(part.radius == 0 for p in placements for part in p.body.parts.values()):
         return between_hulls(placements, lattice, known)
     pair, touches = twins(placements, lattice)
     definitions, gaps = written_out({t.gap.name: t.gap for t in touches})
@@ -302,11 +309,6 @@ def between(
     )
 
 
-def is_sharp(part: Part) -> bool:
-    """Whether a part is a polygon or polyhedron that is not rounded."""
-    return part.radius == 0
-
-
 def between_hulls(
     placements: tuple[Placement, Placement], lattice: Lattice, known: Laws
 ) -> HullContacts:
@@ -320,13 +322,16 @@ def between_hulls(
         raise NotImplementedError(msg)
     static, dynamic = known.friction.get(name, NONE)
     d, scale = placements[0].body.dimension, placements[0].manifold.scales[0]
-    laws = ()
+    laws: tuple[PairLaw, ...] = ()
     if static:
-        rubbing = [next(iter(members(p.name, p.body, p))) for p in placements]
+        rubbing = [m for p in placements for m in members(p.name, p.body, p)]
         _check_turning("friction", rubbing, static)
         laws = (PairLaw(d - 1, _set(static, d), _set(dynamic, d)),)
     one, two = (
-        [_hull(f"{p.name}{k}", part_name, part) for part_name, part in p.body.parts.items()]
+        [
+            _hull(f"{p.name}{k}.{part_name}" if part_name else f"{p.name}{k}", part)
+            for part_name, part in p.body.parts.items()
+        ]
         for p, k in zip(placements, PAIR, strict=True)
     )
     return HullContacts(
@@ -342,9 +347,49 @@ def between_hulls(
     )
 
 
-def _hull(body: str, name: str, part: Part) -> Hull:
+def listed_hulls(one: PlacedPart, two: PlacedPart, scale: float) -> HullContacts:
+    """Return the contacts of two sharp parts, of which one may be fixed, without friction."""
+    if one.image or two.image:
+        msg = (
+            f"period: expected no images of sharp bodies that are listed; repeat one (count=) or "
+            f"round them; got {one.name}-{two.name}"
+        )
+        raise NotImplementedError(msg)
+    return HullContacts(
+        [(_hull(one.name, one.part), _hull(two.name, two.part))],
+        (len(one.coordinates), len(two.coordinates)),
+        OPTIONS.parting * scale,
+        OPTIONS.touching * scale,
+        (),
+        2 * max(np.linalg.norm(m.part.points, axis=1).max() for m in (one, two)) / scale,
+        (),
+        reads=(*one.coordinates, *two.coordinates),
+    )
+
+
+def rubbing_hulls(
+    contacts: HullContacts, one: PlacedPart, two: PlacedPart, known: Laws
+) -> HullContacts:
+    """Return contacts of two sharp parts with friction by the laws of each."""
+    d, rubbing = one.part.dimension, {}
+    for label in contacts.names:
+        if known.rolling.get(label, NONE)[0]:
+            msg = (
+                f"rolling: expected 0 between sharp polygons or polyhedra, which roll on no "
+                f"radius; got {known.rolling[label]} of {label}"
+            )
+            raise NotImplementedError(msg)
+        static, dynamic = known.friction.get(label, NONE)
+        if static:
+            rubbing[label] = _set(static, d), _set(dynamic, d)
+            _check_turning("friction", [m for m in (one, two) if m.coordinates], static)
+    return replace(contacts, friction=rubbing)
+
+
+def _hull(label: str, part: Part) -> Hull:
     """Return a sharp part with the numbers that the compiled code needs."""
-    facets, label = part.facets, f"{body}.{name}" if name else body
+    facets = part.facets
+    assert facets is not None, label
     if len(part.points) > MOST_VERTICES:
         why = "since contacts are as many as pairs of edges"
         expected = f"at most {MOST_VERTICES} vertices of {label!r}, {why}"
@@ -357,15 +402,3 @@ def _renamed(p: Placement, name: str) -> Manifold:
     """Return the manifold of a body of another name."""
     named = p.frame.manifold(name, p.body.dimension, 1.0, 1.0, "")
     return replace(named, scales=p.manifold.scales, units=p.manifold.units)
-
-
-def smooth(polyhedron: Polyhedron) -> Polyhedron:
-    """Return the polyhedron, or raise where motion would need a union."""
-    if polyhedron.is_union:
-        msg = (
-            "bodies: expected rounded bodies (radius > 0), or one sharp body that is repeated "
-            "(count=); other sharp polygons or polyhedra are apart in one of several ways, of "
-            "which motion chooses none"
-        )
-        raise NotImplementedError(msg)
-    return polyhedron

@@ -141,6 +141,11 @@ def _imaged(family: Family, one: PlacedPart, two: PlacedPart) -> tuple[Family, l
     return made, [*middles, *shift, *lengths]
 
 
+def both_sharp(one: PlacedPart, two: PlacedPart) -> bool:
+    """Whether neither of two parts is rounded."""
+    return one.part.radius + two.part.radius == 0
+
+
 def apart(manifold: Manifold, one: PlacedPart, two: PlacedPart, *, excluded: bool = True) -> Tree:
     """Return the gaps of two parts.
 
@@ -149,8 +154,7 @@ def apart(manifold: Manifold, one: PlacedPart, two: PlacedPart, *, excluded: boo
     """
     if one.frame is Frame.FIXED:
         one, two = two, one
-    radius = one.part.radius + two.part.radius
-    if radius == 0:
+    if both_sharp(one, two):
         return separated(manifold, one, two)
     parts: list[Tree] = [touch.gap for touch in distances(manifold, one, two)]
     if excluded and _can_cross(one, two):

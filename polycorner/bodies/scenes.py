@@ -6,7 +6,7 @@ have to agree with.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -37,6 +37,8 @@ class BodiesInSpace(Scene):
         How often the only body is repeated.
     twins : function
         Returns the placements of two bodies like it and their contacts.
+    further : mapping from str to (str, str)
+        The bodies at contacts of which no more is known.
     """
 
     placements: tuple[Placement, ...]
@@ -45,6 +47,7 @@ class BodiesInSpace(Scene):
     walls: frozenset[str]
     count: int
     twins: Callable[[], tuple[Sequence[Placement], Sequence[Touch]]]
+    further: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     @cached_property
     def names(self) -> tuple[str, ...]:  # type: ignore[override] # it is not written
@@ -81,7 +84,9 @@ class BodiesInSpace(Scene):
         if contact in self._between:
             t, _ = self._between[contact]
             return self._called(t.one, bodies), self._called(t.two, bodies)
-        return ()
+        if len(bodies) == 2:
+            return self.names[bodies[0]], self.names[bodies[1]]
+        return self.further.get(contact, ())
 
     def _called(self, m: PlacedPart, bodies: tuple[int, ...]) -> str:
         """Return the name of a body, where it is repeated that of one of those at the contact."""
@@ -101,6 +106,8 @@ class BodiesInSpace(Scene):
             (p,) = _placed(member, local[None], {x.name: x for x in self.placements}, own)
             normal, radius = _inward(wall, p), member.part.radius
             return Site(a, b, p - radius * normal, normal, radius)
+        if contact not in self._between:
+            return None
         touch, placements = self._between[contact]
         one, two = touch.one, touch.two
         first = _placed(one, touch.first, placements, own)

@@ -269,6 +269,8 @@ def _told(system: System) -> dict[str, Any]:
             ],
             "restitution": family.restitution,
         }
+    if system.hulls:
+        told["hulls"] = [hulls.described() for hulls in system.hulls]
     return told | {"count": system.count, "between": between}
 
 

@@ -105,6 +105,9 @@ def accelerations(system: System, state: State) -> Accelerations:
     instance("state", state, State)
     if system.count != 1:
         refuse("system", "one body, its count being 1", system.count)
+    if system.hulls:
+        expected = "contacts that are formulas, none of two sharp hulls"
+        refuse("system", expected, system.hulls[0].names[0], NotImplementedError)
     problem = _Problem.of(system, state)
     found: list[tuple[Array, Array]] = []
     several = False

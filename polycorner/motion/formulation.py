@@ -121,6 +121,8 @@ class Formulation:
         Identifies the laws across processes.
     shared : mapping from int to SmoothFunction
         Slips, by number, that share formulas with those of other contacts.
+    further : sequence of Call
+        Kernels of further slips that are no formulas; their rows follow.
     """
 
     coordinates: tuple[str, ...]
@@ -130,6 +132,7 @@ class Formulation:
     loads: int
     key: str = ""
     shared: Mapping[int, SmoothFunction] = field(default_factory=dict)
+    further: Sequence[Call] = ()
 
     @classmethod
     def of(cls, coordinates: Sequence[str], parameters: Sequence[str], laws: Laws) -> "Formulation":
@@ -211,9 +214,13 @@ class Formulation:
             names, lambda: [self.laws().slips[i] for i in own], held=self.coordinates
         )
 
-    @cached_property
+    @property
     def slip_calls(self) -> list[Call]:
         """Kernels of all slip velocities; that of :attr:`slip` reads the own parameters."""
+        return [*self._slips_of_laws, *self.further]
+
+    @cached_property
+    def _slips_of_laws(self) -> list[Call]:
         own = tuple(i for i in range(self.slips) if i not in self.shared)
         calls = []
         if own:
@@ -233,7 +240,7 @@ class Formulation:
         numbers = np.array([*parameters, 0.0])
         slips = np.zeros((len(at), self.slips))
         slopes = np.zeros((*slips.shape, len(self.variables)))
-        for call in self.slip_calls:
+        for call in self._slips_of_laws:
             given = numbers if call.family is self.slip else call.parameters
             inputs = np.ascontiguousarray(at[:, call.reads])
             values, gradients = call.family.kernel.over(inputs, given.ctypes.data, 1)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.checks import names, real, reals, refuse, whole
+from polycorner.formulas.bundles import Call
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.kinds import check_fields, checked
 from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
@@ -30,6 +31,7 @@ from polycorner.motion.formulation import (
 )
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
+from polycorner.motion.noise import OPTIONS
 from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
 from polycorner.motion.scenes import Scene
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -77,6 +79,8 @@ class System(MechanicalSystem, Printed):
         A coordinate and its limit: a body that passes it leaves the system for good.
     scene : Scene, optional
         Names of the bodies in space, and where they touch; of systems of an arrangement.
+    hulls : sequence of HullContacts, optional
+        Contacts of sharp hulls, of a body with its surroundings or of two that the system is of.
 
     Raises
     ------
@@ -135,6 +139,7 @@ class System(MechanicalSystem, Printed):
     substrate: Mapping[str, float] = field(default_factory=dict)
     exits: Mapping[str, float] = field(default_factory=dict)
     scene: Scene | None = None
+    hulls: tuple[HullContacts, ...] = ()
 
     def __repr__(self) -> str:
         """Return the bodies, and the numbers of coordinates, contacts and laws of friction."""
@@ -225,7 +230,8 @@ class System(MechanicalSystem, Printed):
     @cached_property
     def contacts(self) -> tuple[str, ...]:
         """Names of the unilateral contacts of a body with its surroundings."""
-        return tuple(f.name for f in self.polyhedron.functions)
+        further = (name for hulls in self.hulls for name in hulls.names)
+        return (*(f.name for f in self.polyhedron.functions), *further)
 
     @property
     def _normals(self) -> tuple[str, ...]:
@@ -282,11 +288,13 @@ class System(MechanicalSystem, Printed):
             for f, gap, loads in zip(self.friction, self.owners, self.load_sources, strict=True)
         )
         scales, coordinates = self.manifold.scale_array, self.manifold.names
+        gaps, rubbing, slips = self._of_hulls
+        formulation = replace(self.formulation, further=slips) if slips else self.formulation
         body = MovingBody(
-            self.formulation,
+            formulation,
             self.parameters,
-            friction,
-            self.polyhedron.bundle.calls,
+            friction + rubbing,
+            gaps,
             self._normals,
             np.append(self.restitutions, np.zeros(len(self.polyhedron.equations))),
             1 / scales,
@@ -303,6 +311,34 @@ class System(MechanicalSystem, Printed):
         told = contacts, position, periods_of(self.manifold, position), float(speed)
         names = () if self.scene is None else self.scene.names
         return IdenticalBodies(body, self.count, *told, exit_at, float(limit), names)
+
+    @cached_property
+    def _of_hulls(self) -> tuple[list[Call], tuple[FrictionContact, ...], list[Call]]:
+        """All gaps, those of hulls before equations; friction of hulls, and its slips."""
+        first, names = len(self.polyhedron.functions), self.manifold.names
+        more, row = len(self.contacts) - first, sum(len(f.slip) for f in self.friction)
+        gaps = [
+            replace(call, rows=tuple(r + more if r >= first else r for r in call.rows))
+            for call in self.polyhedron.bundle.calls
+        ]
+        rubbing: list[FrictionContact] = []
+        slips = []
+        for hulls in self.hulls:
+            gaps.append(hulls.gaps_of(names, first))
+            rows, some = (
+                hulls.dimension - 1,
+                [g for g, n in enumerate(hulls.names) if n in hulls.friction],
+            )
+            for g in some:
+                name = hulls.names[g]
+                sets = hulls.friction[name]
+                rubbing.append(
+                    FrictionContact(f"{name} slips", rows, *sets, first + g, (), "sliding")
+                )
+            if some:
+                slips.append(hulls.slips_of(names, some, row))
+            first, row = first + len(hulls.names), row + rows * len(some)
+        return gaps, tuple(rubbing), slips
 
     # -------------------------------------------------------------------------------------- states
 
@@ -345,6 +381,7 @@ class System(MechanicalSystem, Printed):
         """Raise ValueError if a contact overlaps or an equation fails, naming the worst."""
         check_contacts(self.polyhedron, q, self._who)
         check_equations(self.polyhedron, q, self.bodies.called)
+        self._check_hulls(q)
         self.bodies.check_apart(q.reshape(self.count, -1))
 
     def _who(self, contact: str, i: int) -> str:
@@ -352,16 +389,34 @@ class System(MechanicalSystem, Printed):
         called = self.bodies.called(i) if self.count > 1 else ""
         return overlapping(self.scene, called, contact, i)
 
+    def _check_hulls(self, q: Array) -> None:
+        deep = -OPTIONS.overlap * min(self.manifold.scales)
+        for hulls in self.hulls:
+            for i, x in enumerate(q.reshape(-1, self.manifold.size)):
+                gap, name = hulls.least(self.manifold.names, x)
+                if gap < deep:
+                    who = self._who(name, i)
+                    at = "" if repr(name) in who else f" at contact {name!r}"
+                    msg = f"q: expected a placement without overlap; {who} by {-gap:.6g}{at}"
+                    raise ValueError(msg)
+
     def sticks(self, q: Array, v: Array, time: float = 0.0) -> NDArray[np.bool_]:
-        """Return for each friction contact whether its slip is zero, ``(..., F)``."""
-        if not self.friction:
-            return np.empty((*q.shape[:-1], 0), dtype=np.bool_)
-        at = np.concatenate([q, v], axis=-1).reshape(-1, 2 * q.shape[-1])
-        parameters = self.formulation.at(self.parameters, time)
-        slips, _ = self.formulation.slip_velocities(parameters, at)
-        starts = np.cumsum([0, *(len(f.slip) for f in self.friction)]).tolist()
-        still = np.stack([~slips[:, a:b].any(axis=1) for a, b in pairwise(starts)], axis=-1)
-        return np.asarray(still.reshape(*q.shape[:-1], len(self.friction)))
+        """Return for each friction contact whether its slip is zero, ``(..., F)``.
+
+        At contacts of hulls, whether nothing moves.
+        """
+        further = len(self._of_hulls[1])
+        shape, n = q.shape[:-1], q.shape[-1]
+        still = np.asarray(~np.any(v, axis=-1))[..., None]
+        found = [np.broadcast_to(still, (*shape, further))]
+        if self.friction:
+            at = np.concatenate([q, v], axis=-1).reshape(-1, 2 * n)
+            parameters = self.formulation.at(self.parameters, time)
+            slips, _ = self.formulation.slip_velocities(parameters, at)
+            starts = np.cumsum([0, *(len(f.slip) for f in self.friction)]).tolist()
+            rests = np.stack([~slips[:, a:b].any(axis=1) for a, b in pairwise(starts)], axis=-1)
+            found.insert(0, rests.reshape(*shape, len(self.friction)))
+        return np.concatenate(found, axis=-1)
 
     @checked
     def energies(self, state: State) -> tuple[float, float]:
@@ -412,6 +467,8 @@ class System(MechanicalSystem, Printed):
         }
         if between is not None:
             told |= between.described()
+        if self.hulls:
+            told["hulls"] = [hulls.described() for hulls in self.hulls]
         return told
 
 

@@ -193,7 +193,7 @@ def test_what_is_refused():
         Arrangement([disc(0.1)], period=[1, 0.4]).system(count=2)
     with pytest.raises(ValueError, match=r"period: .* at least 1\.33333 "):
         Arrangement([disc(0.1)], fixed={"F": disc(0.5)}, period=[1, 1]).system(count=2)
-    with pytest.raises(NotImplementedError, match="expected rounded bodies"):
+    with pytest.raises(NotImplementedError, match="expected no images of sharp bodies"):
         Arrangement([polygon([[0, 0], [0.1, 0], [0, 0.1]])] * 2, period=[1, 1]).system()
 
 

@@ -6,10 +6,10 @@ derived beside it, from balances of forces, energy and momentum.
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 import pytest
+from posed import FLOOR, TABLE, G, Row, brick, check, cube, moved, stays
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -24,44 +24,9 @@ from polycorner.bodies import (
     disc,
     mass_of,
     polygon,
-    polytope,
     sphere,
 )
 from polycorner.motion import EventKind
-
-G = 9.81
-FLOOR = {"floor": HalfSpace([0, 1], [0, 0])}
-TABLE = {"floor": HalfSpace([0, 0, 1], [0, 0, 0])}
-
-
-class Row(NamedTuple):
-    """What was asked, found and expected."""
-
-    asked: str
-    found: object
-    expected: object
-    tolerance: float = 0.0
-
-
-def brick(a, b, r=0.02):
-    return polygon([[-a, -b], [a, -b], [a, b], [-a, b]], r)
-
-
-def cube(a=0.5, r=0.02):
-    return polytope([[x, y, z] for x in (-a, a) for y in (-a, a) for z in (-a, a)], r)
-
-
-def moved(arrangement, q, seconds, *, moving=None, dt=1e-3, **laws):
-    """Return the motion from a placement."""
-    system = arrangement.system(**laws)
-    v = None if moving is None else arrangement.velocity(q, moving)
-    return simulate(system, system.state(q, v), seconds, dt)
-
-
-def stays(arrangement, q, **laws):
-    """Return whether nothing moves in three tenths of a second."""
-    path = moved(arrangement, q, 0.3, **laws)
-    return bool(np.abs(path.q[-1] - q).max() < 1e-8)
 
 
 def leaning(length, r, angle, **given):
@@ -480,9 +445,4 @@ PROBLEMS = [
 
 @pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.__name__)
 def test_a_problem_has_its_answer(problem, subtests):
-    for row in problem():
-        with subtests.test(row.asked):
-            if row.tolerance:
-                assert row.found == pytest.approx(row.expected, abs=row.tolerance)
-            else:
-                assert row.found == row.expected
+    check(problem, subtests)

@@ -2,14 +2,16 @@
 
 import ctypes
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from polycorner.formulas.bundles import Call
 from polycorner.formulas.kernels import address
 from polycorner.motion.bodies import PairContacts, PairLaw
+from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.hulls.intermediate import NAMES, SHIPPED
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Value
@@ -49,8 +51,8 @@ class Hull(Value):
             for i, j, left, right in self.edges
         ]
         shape = [len(points), len(normals), len(edges), *centre, min(widths) / 2]
-        parts = [shape, points, np.column_stack([normals, levels]), np.array(edges)]
-        return [float(x) for part in parts for x in np.ravel(part)]
+        parts = [np.array(shape), points, np.column_stack([normals, levels]), np.array(edges)]
+        return [*map(float, np.concatenate([part.ravel() for part in parts]))]
 
     def touches(self, other: "Hull") -> list[str]:
         """Return the names of the contacts of two hulls, in the order of ``gaps.py``."""
@@ -108,7 +110,7 @@ class HullFamily(Value):
 
 @dataclass(frozen=True, eq=False)
 class HullContacts(Value):
-    """The contacts between any two of several bodies of sharp hulls.
+    """The contacts between any two of several bodies of sharp hulls, or of two in one system.
 
     Attributes
     ----------
@@ -125,6 +127,10 @@ class HullContacts(Value):
         As in :class:`~polycorner.motion.ContactFamily`.
     laws : tuple of PairLaw
         Of dry friction.
+    reads : tuple of str, optional
+        Of two bodies of one system, or one and a fixed one, their coordinates.
+    friction : mapping from str to (ConvexSet, ConvexSet), optional
+        Of these, the static and the dynamic set at contacts that rub.
     """
 
     pairs: Sequence[tuple[Hull, Hull]]
@@ -136,6 +142,8 @@ class HullContacts(Value):
     position: tuple[str, ...]
     laws: tuple[PairLaw, ...] = ()
     restitution: float = 0.0
+    reads: tuple[str, ...] = ()
+    friction: Mapping[str, tuple[ConvexSet, ConvexSet]] = field(default_factory=dict)
 
     @property
     def dimension(self) -> int:
@@ -150,28 +158,57 @@ class HullContacts(Value):
     @property
     def table(self) -> list[float]:
         """The entries of the table; see ``geometry.py``."""
-        periods = [p if np.isfinite(p) else 0.0 for p in (*self.periods, np.inf, np.inf)[:3]]
-        head = [
-            *self.coordinates,
-            self.through,
-            self.zero,
-            *periods,
-            self.dimension,
-            len(self.pairs),
-        ]
+        periods = [p if np.isfinite(p) else 0.0 for p in (*self.periods, *[np.inf] * 3)[:3]]
+        head = [*self.coordinates, self.through, self.zero, *periods, self.dimension]
+        head += [len(self.names), len(self.pairs)]
         places: dict[int, int] = {}
         parts: list[float] = []
-        first, listed = len(head) + 3 * len(self.pairs), []
-        contacts = 0
-        for pair in self.pairs:
-            for hull in pair:
+        listed: list[int] = []
+        first, contacts = len(head) + 3 * len(self.pairs), 0
+        for one, two in self.pairs:
+            for hull in (one, two):
                 if id(hull) not in places:
                     places[id(hull)] = first + len(parts)
                     parts += hull.numbers
-            one, two = pair
             listed += [places[id(one)], places[id(two)], contacts]
             contacts += len(one.touches(two))
         return [*map(float, [*head, *listed]), *parts]
+
+    @property
+    def _key(self) -> str:
+        return f"hulls {hashlib.sha256(np.array(self.table).tobytes()).hexdigest()}"
+
+    def gaps_of(self, names: Sequence[str], first: int) -> Call:
+        """Return the gaps as those of a system with its surroundings.
+
+        ``names`` are its coordinates, of which the two bodies have :attr:`reads`; ``first`` is the
+        number of the first contact.
+        """
+        n, count = len(self.reads), len(self.names)
+        kernel = HullKernel(self._key, ("values", "finite"), n, count)
+        family = HullFamily(self.names, self.reads, kernel.key, kernel)
+        reads = tuple(map(list(names).index, self.reads))
+        rows = tuple(range(first, first + count))
+        return Call(family, reads, np.array(self.table), rows, tuple(range(count)))  # type: ignore[arg-type]
+
+    def slips_of(self, names: Sequence[str], columns: Sequence[int], first: int) -> Call:
+        """Return the slips at some contacts in the same way, from the row ``first`` on."""
+        n, each = len(self.reads), self.dimension - 1
+        outputs = each * len(self.names)
+        kernel = HullKernel("slips of hulls", ("all_slips", "all_slips"), 2 * n, outputs)
+        family = HullFamily(tuple(f"s{i}" for i in range(outputs)), (), kernel.key, kernel)
+        reads = tuple(map(list(names).index, self.reads))
+        some = tuple(each * g + c for g in columns for c in range(each))
+        reads = (*reads, *(r + len(names) for r in reads))
+        rows = tuple(range(first, first + len(some)))
+        return Call(family, reads, np.array(self.table), rows, some)  # type: ignore[arg-type]
+
+    def least(self, names: Sequence[str], q: Array) -> tuple[float, str]:
+        """Return the least gap at the coordinates of a system, and its contact."""
+        call = self.gaps_of(names, 0)
+        at = q[list(call.reads)]
+        values = call.family.kernel.at(at, call.parameters.ctypes.data, 0)[0]
+        return float(values.min()), self.names[int(values.argmin())]
 
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""
@@ -179,6 +216,7 @@ class HullContacts(Value):
         return {
             "hulls": self.table,
             "friction between bodies": laws,
+            "friction": {name: [*map(str, sets)] for name, sets in self.friction.items()},
             "restitution between bodies": self.restitution,
             "reach": self.reach,
         }
@@ -187,11 +225,10 @@ class HullContacts(Value):
         """Return the compiled contacts of bodies with coordinates on a manifold, or on two."""
         table, names, both = self.table, self.names, (manifold, other or manifold)
         n = sum(one.size for one in both)
-        digest = hashlib.sha256(np.array(table).tobytes()).hexdigest()
         variables = tuple(f"{x}{k}" for k, one in enumerate(both, 1) for x in one.names)
-        kernel = HullKernel(f"hulls {digest}", ("values", "gradients"), n, len(names))
+        kernel = HullKernel(self._key, ("values", "gradients"), n, len(names))
         gaps = HullFamily(names, variables, kernel.key, kernel)
-        slips = ()
+        slips: tuple[tuple[HullFamily, bool, tuple[float, float]], ...] = ()
         if self.laws:
             rows = tuple(f"s{i}" for i in range(self.dimension - 1))
             slip = HullKernel("slips of hulls", ("slips", "slips"), 2 * n, len(rows))

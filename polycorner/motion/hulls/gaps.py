@@ -23,6 +23,7 @@ edges.
 import numpy as np
 
 from polycorner.motion.hulls.geometry import (
+    CONTACTS,
     DIMENSION,
     EDGES,
     FACES,
@@ -53,6 +54,9 @@ from polycorner.motion.hulls.geometry import (
 )
 from polycorner.motion.hulls.memory import compiled, get, put
 from polycorner.motion.hulls.planes import FIRST, SECOND, plane_between
+
+# How gradients are written: those of infinite gaps not at all, or none is infinite.
+PAIR_SLOPES, OWN_SLOPES = np.int64(1), np.int64(2)
 
 
 @compiled
@@ -173,7 +177,7 @@ def show_overlap(q, table, here, s, f, J, slopes):
 
 @compiled
 def evaluate_parts(q, table, here, s, f, J, slopes):
-    """Write the gaps of two parts and, if asked for, their gradients."""
+    """Write the gaps of two parts and, unless ``slopes`` is zero, their gradients."""
     m, _, r, t = here
     one, two, g = parts_of(table, s)
     width = whole(table, ONE) + whole(table, TWO)
@@ -198,7 +202,7 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
     thickness = min(get(table, one + THICKNESS), get(table, two + THICKNESS))
     far = height > thickness
     # Finite where curvature is measured: a contact that acts may be none at the next midpoint.
-    none = np.inf if slopes else thickness + max(height, 0.0)
+    none = np.inf if slopes == PAIR_SLOPES else thickness + max(height, 0.0)
     edges, others = whole(table, one + EDGES), whole(table, two + EDGES)
     for b in range(others):
         at = edge_at(table, two, b)
@@ -220,10 +224,10 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
 
 @compiled
 def gaps(q, table, f, J, slopes):
-    """Write the gaps of two bodies, and their gradients if ``slopes`` is not zero."""
+    """Write the gaps of two bodies, and their gradients unless ``slopes`` is zero."""
     here = places(q, table)
     for s in range(whole(table, PAIRS)):
-        evaluate_parts(q, table, here, s, f, J, slopes != 0)
+        evaluate_parts(q, table, here, s, f, J, slopes)
     return 0
 
 
@@ -235,8 +239,17 @@ def values(q, table, f, J, H):
 
 @compiled
 def gradients(q, table, f, J, H):
-    """Write the gaps of two bodies and their gradients."""
-    return gaps(q, table, f, J, np.int64(1))
+    """Write the gaps of two bodies and their gradients; infinite ones have none."""
+    return gaps(q, table, f, J, PAIR_SLOPES)
+
+
+@compiled
+def finite(q, table, f, J, H):
+    """Write the gaps of two bodies, none of which is infinite, and their gradients."""
+    width = whole(table, ONE) + whole(table, TWO)
+    for a in range(width * whole(table, CONTACTS)):
+        put(J, np.int64(a), 0.0)
+    return gaps(q, table, f, J, OWN_SLOPES)
 
 
 @compiled
@@ -253,6 +266,19 @@ def tangent(normal, d, which):
 
 
 @compiled
+def add_slip(q, table, here, normal, x, f, J, row):
+    """Write the slip at a point, and its derivatives by velocities, into rows from one on."""
+    d, reads = whole(table, DIMENSION), whole(table, ONE) + whole(table, TWO)
+    for c in range(d - 1):
+        at = J + 8 * 2 * reads * (row + c)
+        add_row(q, table, here, tangent(normal, d, c), x, at, reads)
+        slip = 0.0
+        for a in range(reads, 2 * reads):
+            slip += get(at, np.int64(a)) * get(q, np.int64(a))
+        put(f, np.int64(row + c), slip)
+
+
+@compiled
 def slips(q, entry, f, J, H):
     """Write the slip velocities at a contact, and their derivatives by velocities.
 
@@ -263,16 +289,31 @@ def slips(q, entry, f, J, H):
     while s > 0 and whole(table, HEAD + PAIR * s + 2) > g:
         s -= 1
     one, two, first = parts_of(table, s)
-    here, d = places(q, table), whole(table, DIMENSION)
+    here = places(q, table)
     m, _, r, t = here
     _, normal, _, _, _ = plane_between(table, one, two, r, t)
-    x, n = point_of(table, here, one, two, normal, g - first), turned(m, normal)
-    reads = whole(table, ONE) + whole(table, TWO)
-    for c in range(d - 1):
-        row = J + 8 * 2 * reads * c
-        add_row(q, table, here, tangent(n, d, c), x, row, reads)
-        slip = 0.0
-        for a in range(reads, 2 * reads):
-            slip += get(row, np.int64(a)) * get(q, np.int64(a))
-        put(f, np.int64(c), slip)
+    x = point_of(table, here, one, two, normal, g - first)
+    add_slip(q, table, here, turned(m, normal), x, f, J, np.int64(0))
+    return 0
+
+
+@compiled
+def all_slips(q, table, f, J, H):
+    """Write the slip velocities at all contacts; zero where parts are far from each other."""
+    here, rows = places(q, table), whole(table, DIMENSION) - 1
+    m, _, r, t = here
+    count = whole(table, CONTACTS)
+    for a in range(rows * count):
+        put(f, np.int64(a), 0.0)
+    for a in range(rows * count * 2 * (whole(table, ONE) + whole(table, TWO))):
+        put(J, np.int64(a), 0.0)
+    for s in range(whole(table, PAIRS)):
+        one, two, first = parts_of(table, s)
+        height, normal, _, _, _ = plane_between(table, one, two, r, t)
+        if height > min(get(table, one + THICKNESS), get(table, two + THICKNESS)):
+            continue
+        vertices = whole(table, one + VERTICES) + whole(table, two + VERTICES)
+        for g in range(vertices + whole(table, one + EDGES) * whole(table, two + EDGES)):
+            x = point_of(table, here, one, two, normal, g)
+            add_slip(q, table, here, turned(m, normal), x, f, J, rows * (first + g))
     return 0

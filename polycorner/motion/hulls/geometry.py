@@ -6,8 +6,9 @@ from polycorner.motion.hulls.memory import compiled, get, put
 
 # Entries of a table, and of a part in it.  Those before the parts: coordinates of either body, the
 # height up to which a plane passes through both, the length that is none, the periods, dimension,
-# number of pairs of parts, and of each pair the places of both parts and its first contact.
-ONE, TWO, THROUGH, ZERO, PERIODS, DIMENSION, PAIRS, HEAD = 0, 1, 2, 3, 4, 7, 8, 9
+# number of contacts and of pairs of parts, and of each pair the places of both parts and its first
+# contact.
+ONE, TWO, THROUGH, ZERO, PERIODS, DIMENSION, CONTACTS, PAIRS, HEAD = 0, 1, 2, 3, 4, 7, 8, 9, 10
 PAIR = 3  # numbers of a pair
 VERTICES, FACES, EDGES, CENTRE, THICKNESS, SHAPE = 0, 1, 2, 3, 6, 7
 FACE, EDGE = 4, 12  # numbers of a face: normal, height; of an edge: point, direction, two normals

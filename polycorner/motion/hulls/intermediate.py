@@ -6,7 +6,7 @@ intermediate`` does this after any of their sources was changed.
 
 from polycorner.formulas.shipped import Shipped
 
-NAMES = ("values", "gradients", "slips")
+NAMES = ("values", "gradients", "finite", "slips", "all_slips")
 # Kernels of formulas take five addresses, and return nothing; functions of Numba return where they
 # are told to.
 CALLED = """
