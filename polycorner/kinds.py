@@ -23,6 +23,7 @@ from typing import Any, ForwardRef, Literal, NoReturn, TypeVar, Union, get_args,
 import numpy as np
 
 from polycorner.checks import is_array, listed, refuse
+from polycorner.signatures import shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 Test = Callable[[Any], bool]
@@ -93,7 +94,7 @@ def checked(function: F) -> F:
                 kinds[name].check(name, value)
         return function(*given, **named)
 
-    return call  # type: ignore[return-value] # a wrapper of the same signature
+    return shown(call)  # type: ignore[return-value] # a wrapper of the same signature
 
 
 @cache

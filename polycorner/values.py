@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner.kinds import check_fields
+from polycorner.signatures import Shown
 
 if TYPE_CHECKING:
     from functools import cached_property as cached_property  # noqa: PLC0414 - for all to import
@@ -40,6 +41,8 @@ class Value:
     read-only: those of a dataclass's fields once it is made, and all of them after unpickling.
     A subclass with a ``__post_init__`` of its own calls this one at its end.
     """
+
+    __signature__ = Shown()
 
     def __post_init__(self) -> None:
         """Make the arrays among the attributes read-only."""

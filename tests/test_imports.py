@@ -77,7 +77,7 @@ def test_public_names_are_sorted_and_listed():
 
 
 def test_an_unknown_name_is_an_attribute_error():
-    with pytest.raises(AttributeError, match="attribute Dumbbell"):
+    with pytest.raises(AttributeError, match="has no 'Dumbbell'"):
         _ = polycorner.Dumbbell
 
 
@@ -146,3 +146,29 @@ def test_an_application_imports_public_names_only(application):
 def test_every_name_that_applications_are_built_with_resolves():
     for door in (polycorner.cli, polycorner.toolkit):
         assert all(getattr(door, name) is not None for name in door.__all__)
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        ("minimize", "did you mean minimise?"),
+        ("optimize", "did you mean minimise?"),
+        ("Polyhedra", "did you mean Polyhedron?"),
+        ("Simulate", "did you mean simulate?"),
+        ("stationary_points", "it is in polycorner.proofs"),
+        ("Arrangement", "it is in polycorner.bodies"),
+        ("arangement", "did you mean polycorner.bodies.Arrangement?"),
+        ("disk", "did you mean bodies.disc?"),
+        ("xyzzy", "has no 'xyzzy'"),
+    ],
+)
+def test_a_name_that_people_type_is_answered(typed, meant):
+    with pytest.raises(AttributeError, match=re.escape(meant)):
+        getattr(polycorner, typed)
+    assert not hasattr(polycorner, typed)
+
+
+def test_rooms_are_found_without_words_about_names():
+    assert importlib.import_module("polycorner.bodies") is polycorner.bodies
+    with pytest.raises(AttributeError, match="__nothing__"):
+        polycorner.__nothing__  # noqa: B018 - that it raises

@@ -29,7 +29,7 @@ from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.mechanisms import Mechanism, check_joints, closed, completed, moved_along
-from polycorner.bodies.neighbours import Pair, check_room, check_width, own_image, pairs
+from polycorner.bodies.neighbours import Pair, check_room, check_width, pairs
 from polycorner.bodies.pairs import Tree, apart, both_sharp, distances, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
 from polycorner.bodies.scenes import BodiesInSpace
@@ -44,6 +44,7 @@ from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, few, listed
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
@@ -288,8 +289,6 @@ class Arrangement(Checked, Printed):
         pairs = [pair for pair in self.pairs if sharp or not both_sharp(*pair)]
         found = [apart(self.manifold, *pair, excluded=excluded) for pair in pairs]
         found += [touch.gap for touch in self.at_walls]
-        if not (found or self.joints or (self.pairs and not sharp)):
-            refuse("bodies", "several bodies, a fixed one or a wall, which they can touch", 1)
         return together(found)
 
     @cached_property
@@ -310,6 +309,7 @@ class Arrangement(Checked, Printed):
             for touch in within(self.manifold, name, wall, member)
         ]
 
+    @shown
     def system(  # noqa: PLR0913 - all are options
         self,
         *,
@@ -418,11 +418,7 @@ class Arrangement(Checked, Printed):
         if count > 1:
             check_width(self.lattice, [first.body], [*self.fixed.values()])
             family = between((first, first), self.lattice, known)
-        single = len(self.placements) == 1
-        free = single and self.lattice.axes and not (self.pairs or self.at_walls)
-        lone = own_image(self.lattice, first) if free else {}
-        parts = None if lone else self.contacts(excluded=False, sharp=False)
-        placed = Polyhedron(self.manifold, lone) if parts is None else self._joined(parts)
+        placed = self._joined(self.contacts(excluded=False, sharp=False))
         rubbing = tuple(rubbing_hulls(one, *pair, known) for one, pair in hulls)
         every = [*placed.names, *(name for one in rubbing for name in one.names)]
         return System(
@@ -460,7 +456,7 @@ class Arrangement(Checked, Printed):
         images and motions that carry one wall to another (:attr:`full_symmetry`).  More than ten
         thousand exchanges, rotations and shifts are left out, all of them.
         """
-        return self._congruences.symmetry(self.polyhedron)
+        return self.congruences.symmetry(self.polyhedron)
 
     @cached_property
     def full_symmetry(self) -> Symmetry:
@@ -470,10 +466,11 @@ class Arrangement(Checked, Printed):
         box, walls or periods, whose sides are parallel to the axes.  The same limit holds.
         :func:`~polycorner.prove` needs the motions alone, which both groups have.
         """
-        return self._congruences.symmetry(self.polyhedron, full=True)
+        return self.congruences.symmetry(self.polyhedron, full=True)
 
     @cached_property
-    def _congruences(self) -> Congruences:
+    def congruences(self) -> Congruences:
+        """What :attr:`symmetry` and :attr:`full_symmetry` are made of."""
         around = tuple(self.walls.values()), tuple(self.fixed.values()), self.lattice
         joined = frozenset(name for joint in self.joints.values() for name in joint.bodies)
         return Congruences(self.placements, *around, joined)
@@ -531,6 +528,7 @@ class Arrangement(Checked, Printed):
         """
         return self.mechanism.values(self.manifold, self.manifold.points(q))
 
+    @shown
     def velocity(
         self, q: ArrayLike, moving: Mapping[str, Any], joints: Mapping[str, float] | None = None
     ) -> Array:

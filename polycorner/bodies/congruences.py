@@ -203,16 +203,21 @@ class Congruences(Value):
         basis = scipy.linalg.null_space(np.concatenate(rows), rcond=DEFAULT.alike).T
         return reduced(basis) if len(basis) else basis
 
-    def symmetry(self, polyhedron: Polyhedron, *, full: bool = False) -> Symmetry:
+    def symmetry(
+        self, polyhedron: Polyhedron, *, full: bool = False, sized: bool = False
+    ) -> Symmetry:
         """Return the group, with the names that functions of a polyhedron change.
 
-        ``full`` says whether isometries are in it that are no motions.
+        ``full`` says whether isometries are in it that are no motions, ``sized`` whether a last
+        coordinate is a factor of all sizes.
         """
         fields, d = [*map(self._field, self.motions), *self._spins()], self.dimension
         carrying = [(np.zeros(d), np.eye(d))]
         if full and not self.joined:
             carrying = isometries(self.walls, self.fixed, self.lattice, self.motions[:, d:])
-        found = elements(self.placements, polyhedron, self._shifts(), carrying, self.joined)
+        found = elements(
+            self.placements, polyhedron, self._shifts(), carrying, self.joined, sized=sized
+        )
         invariants = self.invariants if fields else None
         return Symmetry(fields=fields, invariants=invariants, elements=tuple(found))
 

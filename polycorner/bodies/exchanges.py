@@ -36,6 +36,8 @@ def elements(
     shifts: Sequence[Sequence[Array]],
     isometries: Sequence[Isometry],
     joined: frozenset[str] = frozenset(),
+    *,
+    sized: bool = False,
 ) -> Iterator[Element]:
     """Yield exchanges of equal bodies with rotations of bodies onto themselves, no identity.
 
@@ -62,7 +64,7 @@ def elements(
     )
     next(changes)  # the identity
     for some in changes:
-        change = Exchange(placements, *some)
+        change = Exchange(placements, *some, sized)
         images = polyhedron.values(np.array([change(q) for q in points]))
         yield Element(change, _renaming(polyhedron.names, values.T, images.T))
 
@@ -102,7 +104,8 @@ def _samples(placements: tuple[Placement, ...], polyhedron: Polyhedron) -> Array
 class Exchange(Value):
     """A map of points: body ``k`` takes the place of body ``order[k]``, turned onto itself.
 
-    Then the whole is carried by an isometry, and the body shifted.
+    Then the whole is carried by an isometry, and the body shifted.  A coordinate behind those of
+    the bodies does not change; ``sized`` says whether it is a factor of their sizes.
     """
 
     placements: tuple[Placement, ...]
@@ -110,13 +113,16 @@ class Exchange(Value):
     order: tuple[int, ...]
     turns: "tuple[Isometry, ...]"
     shifts: "tuple[Array, ...]"
+    sized: bool = False
 
     def __call__(self, q: Array) -> Array:
         """Return the image of a point ``(N,)``."""
         found = []
         (start, whole), d = self.isometry, self.placements[0].body.dimension
         changes = zip(self.placements, self.order, self.turns, self.shifts, strict=True)
-        for p, source, (shift, turn), by in changes:
+        factor = q[-1] if self.sized else 1.0
+        for p, source, (middle, turn), by in changes:
+            shift = factor * middle
             if p.frame is Frame.AXIAL:
                 # The matrix of a body of revolution is not unique; its axis is.
                 there = q[self.placements[source].at]
@@ -127,7 +133,7 @@ class Exchange(Value):
             origin, matrix = self.placements[source].pose(q)
             origin = start + whole @ (origin + matrix @ shift) + by
             found.append(p.coordinates(origin, whole @ matrix @ turn))
-        return np.concatenate(found)
+        return np.concatenate([*found, q[self.placements[-1].at.stop :]])
 
 
 def _own_turns(p: Placement, whole: Array) -> list[Isometry]:

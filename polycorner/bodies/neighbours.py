@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations, product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +15,6 @@ from polycorner.checks import refuse
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.tolerances import DEFAULT
-
-if TYPE_CHECKING:
-    import sympy
-
 
 Pair = tuple[PlacedPart, PlacedPart]
 
@@ -99,19 +94,6 @@ def check_width(lattice: Lattice, kinds: Sequence[Body], fixed: Sequence[Body]) 
     if max(lattice.counts(reach)) > 1:
         least = f"lengths of at least {2 * reach / CLEAR:g} for repeated bodies"
         refuse("period", f"{least} that touch up to {reach:g} apart", shortest)
-
-
-def own_image(lattice: Lattice, p: Placement) -> "dict[str, sympy.Expr]":
-    """Return a gap that never vanishes, for repeated bodies that only touch each other.
-
-    It is that of a ball about a body and its nearest image.
-    """
-    import sympy
-
-    axis = int(np.argmin(lattice.lengths))
-    mark = _mark(tuple(int(k == axis) for k in range(len(lattice.lengths))))
-    room = float(lattice.lengths[axis]) - 2 * radius(p.body.markers, [*p.body.parts.values()])
-    return {f"{p.name}-{p.name}{mark}": sympy.Float(room)}
 
 
 def _overlaps(lattice: Lattice, p: Placement) -> bool:

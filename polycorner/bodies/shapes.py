@@ -19,6 +19,7 @@ from polycorner import checks
 from polycorner.checks import refuse
 from polycorner.kinds import checked
 from polycorner.printing import few
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, Value, cached_property
@@ -263,6 +264,7 @@ def turning(turn: Turn | None, dimension: int) -> Array:
     return np.array([[cosine, -sine], [sine, cosine]])
 
 
+@shown
 def disc(radius: float, at: ArrayLike = (0.0, 0.0)) -> Body:
     """Return a disc in the plane.
 
@@ -275,11 +277,13 @@ def disc(radius: float, at: ArrayLike = (0.0, 0.0)) -> Body:
     return _simple(_points("at", [at], 2), checks.real("radius", radius, above=0))
 
 
+@shown
 def sphere(radius: float, at: ArrayLike = (0.0, 0.0, 0.0)) -> Body:
     """Return a ball in space; parameters as for :func:`disc`."""
     return _simple(_points("at", [at], 3), checks.real("radius", radius, above=0))
 
 
+@shown
 def capsule(start: ArrayLike, end: ArrayLike, radius: float) -> Body:
     """Return the points within ``radius`` of a segment, in the plane or in space.
 
@@ -296,6 +300,7 @@ def capsule(start: ArrayLike, end: ArrayLike, radius: float) -> Body:
     return _simple(ends, checks.real("radius", radius, above=0))
 
 
+@shown
 def polygon(vertices: ArrayLike, radius: float = 0.0) -> Body:
     """Return a convex polygon in the plane.
 
@@ -346,6 +351,7 @@ def _turns(points: Array) -> tuple[Array, Array]:
     return turns, np.arctan2(after[:, 1], after[:, 0])
 
 
+@shown
 def polytope(vertices: ArrayLike, radius: float = 0.0) -> Body:
     """Return a convex polyhedron in space.
 

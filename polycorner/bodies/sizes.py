@@ -6,8 +6,12 @@ about their origins, it is that of points ``c p`` and radii that are as many tim
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies.arrangement import Arrangement
@@ -15,6 +19,7 @@ from polycorner.bodies.frames import Frame, symbols
 from polycorner.bodies.gaps import points_of
 from polycorner.bodies.kernels import together
 from polycorner.bodies.pairs import PlacedPart, Tree, apart
+from polycorner.bodies.shapes import Body, Part
 from polycorner.bodies.walls import HalfSpace
 from polycorner.checks import about, instance, refuse
 from polycorner.formulas import cache
@@ -24,7 +29,9 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
-from polycorner.spaces.manifold import Manifold
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     from polycorner.bodies.gaps import Formulas
@@ -39,13 +46,76 @@ SMALL = "small"  # bodies as small as they may be
 Change = Callable[[Family, bool], tuple[Family, tuple[float, ...]] | None]
 
 
+class Resized(Polyhedron):
+    """The placements of bodies together with a coordinate of their sizes, the last one.
+
+    Attributes
+    ----------
+    arrangement : Arrangement
+        Of the bodies as they are given.
+    scales : bool
+        Whether the coordinate is a factor of all sizes, not a reduction of radii.
+    """
+
+    def __init__(
+        self, arrangement: Arrangement, manifold: Manifold, parts: AllOf, *, scales: bool
+    ) -> None:
+        super().__init__(manifold, parts, arrangement.mechanism.equations)
+        self.arrangement, self.scales = arrangement, scales
+
+    def at(self, q: ArrayLike) -> Arrangement:
+        """Return the arrangement of bodies of the sizes that they have at a point ``(N,)``."""
+        size = float(self.manifold.point(q)[-1])
+        factor, less = (size, 0.0) if self.scales else (1.0, size)
+        parts = [part for body in self.arrangement.named.values() for part in body.parts.values()]
+        least = min(part.radius for part in parts) - less
+        if factor <= 0 or least < 0 or (least == 0 and not self.scales):
+            refuse("q", "a point at which bodies have sizes", size)
+        bodies = {
+            name: Body(
+                {
+                    part: Part(factor * shape.points, factor * shape.radius - less)
+                    for part, shape in body.parts.items()
+                }
+            )
+            for name, body in self.arrangement.named.items()
+        }
+        return replace(self.arrangement, bodies=bodies)
+
+    def placed(self, q: ArrayLike) -> dict[str, Body]:
+        """Return the bodies where they are at a point ``(N,)``, of their sizes there."""
+        return self.at(q).placed(self.manifold.point(q)[:-1])
+
+    @cached_property
+    def symmetry(self) -> Symmetry:
+        """As :attr:`Arrangement.symmetry`: sizes do not change."""
+        return self._symmetry(full=False)
+
+    @cached_property
+    def full_symmetry(self) -> Symmetry:
+        """As :attr:`Arrangement.full_symmetry`: sizes do not change."""
+        return self._symmetry(full=True)
+
+    def _symmetry(self, *, full: bool) -> Symmetry:
+        found = self.arrangement.congruences.symmetry(self, full=full, sized=self.scales)
+        if found.invariants is None:
+            return found
+        last = partial(_and_size, found.invariants, self.manifold.scales[-1])
+        return replace(found, invariants=last)
+
+
+def _and_size(invariants: Callable[[Array], Array], scale: float, q: Array) -> Array:
+    return np.append(invariants(q), q[-1] / scale)
+
+
 @checked
-def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True) -> Polyhedron:
+def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True) -> Resized:
     """Return the placements of bodies whose radii are all smaller by a further coordinate.
 
     The least ``t`` that can be had is that of the thickest bodies, which are jammed.  It is at
     least zero (the function ``full``) and at most the least radius (``thin``); fixed bodies keep
-    their radii.
+    their radii.  The polyhedron has a ``symmetry`` and a ``full_symmetry``, as arrangements have,
+    ``placed(q)`` returns the thinner bodies in their places, and ``at(q)`` their arrangement.
 
     Parameters
     ----------
@@ -103,19 +173,20 @@ def thinned(arrangement: Arrangement, name: str = "t", *, excluded: bool = True)
     limits = SmoothFunction(FULL, t, manifold), SmoothFunction(THIN, least - t, manifold)
     held = [SmoothFunction(*one, manifold) for one in arrangement.mechanism.limits.items()]
     parts = AllOf(*together(gaps), *held, *limits)
-    return Polyhedron(manifold, parts, arrangement.mechanism.equations)
+    return Resized(arrangement, manifold, parts, scales=False)
 
 
 @checked
 def scaled(
     arrangement: Arrangement, name: str = "size", *, least: float = 0.01, excluded: bool = True
-) -> Polyhedron:
+) -> Resized:
     """Return the placements of bodies that are all ``size`` times as large, a further coordinate.
 
     Bodies are scaled about their origins, with their radii; fixed bodies, walls and periods keep
     their sizes.  The coordinate is at most 1 (the function ``full``) and at least ``least``
     (``small``).  Where bodies do not turn, gaps of sharp polygons and polyhedra are linear in
-    positions and size together.
+    positions and size together.  There are ``symmetry``, ``placed`` and ``at`` as for
+    :func:`thinned`.
 
     Parameters
     ----------
@@ -165,7 +236,7 @@ def scaled(
         gaps.append(_lifted(touch.gap, manifold, partial(_larger, False, moving)))
     size = manifold.symbols[-1]
     limits = SmoothFunction(FULL, 1 - size, manifold), SmoothFunction(SMALL, size - least, manifold)
-    return Polyhedron(manifold, AllOf(*together(gaps), *limits))
+    return Resized(arrangement, manifold, AllOf(*together(gaps), *limits), scales=True)
 
 
 def _moving(one: PlacedPart, two: PlacedPart) -> int:

@@ -19,6 +19,7 @@ from polycorner.bodies.waves import checked_waves, wave_depth
 from polycorner.checks import refuse
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import Checked, cached_property
 
@@ -183,6 +184,7 @@ class Cylinder(Checked):
 Wall = HalfSpace | Cylinder
 
 
+@shown
 def box(low: ArrayLike, high: ArrayLike) -> dict[str, HalfSpace]:
     """Return the walls of a box: ``left``, ``right``, ``bottom``, ``top``, ``front``, ``back``.
 

@@ -6,6 +6,7 @@ beside their files, are entry points of ``polycorner.studies`` (:mod:`polycorner
 """
 
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
 from itertools import pairwise
@@ -89,9 +90,11 @@ class LazyGroup(click.Group):
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
-            if registered("commands"):
-                raise
-            msg = f"{error.message.rstrip('.')}; {UNREGISTERED}"
+            msg = error.message.rstrip(".")
+            if not registered("commands"):
+                msg = f"{msg}; {UNREGISTERED}"
+            elif close := get_close_matches(args[0].lower(), self.list_commands(ctx), n=1):
+                msg = f"{msg}: did you mean {close[0]!r}?"  # Click tells since its version 8.4
             raise click.UsageError(msg, ctx) from error
 
 

@@ -30,6 +30,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, Table, listed, names, number
 from polycorner.progress import Progress, silent
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
@@ -129,6 +130,7 @@ def _shown(count: int, total: int) -> tuple[str, str, str, str]:
     return share, f"{low:.2%}", f"{high:.2%}", str(count)
 
 
+@shown
 def basins(  # noqa: PLR0913 - all but two are options
     polyhedron: Polyhedron | Landscape,
     energy: "Energy | None" = None,
@@ -219,6 +221,7 @@ def basins(  # noqa: PLR0913 - all but two are options
     return _basins(points, known, ends)
 
 
+@shown
 def minimum_of(
     landscape: Landscape,
     start: ArrayLike,

@@ -30,6 +30,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, TOLERANCE, Tolerances
 
@@ -356,6 +357,7 @@ def _minimum(node: FoundMinimum) -> Minimum:
     return Minimum(node.point, (found.energy, found.energy), found.active, kind, node.orbit)
 
 
+@shown
 def search_landscape(  # noqa: PLR0913 - all but two are options
     polyhedron: Polyhedron,
     energy: "Energy",

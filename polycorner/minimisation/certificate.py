@@ -35,6 +35,7 @@ from polycorner.printing import (
     number,
     units,
 )
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
@@ -386,6 +387,7 @@ class Certificate(Checked, Printed):
         return listed("", (*head, "least", "largest"), wide, len(rows), (1, 2, 3, 4))
 
 
+@shown
 def certify(
     polyhedron: "Polyhedron",
     energy: "Energy",

@@ -38,6 +38,7 @@ from polycorner.polyhedra.cones import Rows
 from polycorner.polyhedra.polyhedron import MAX_SELECTIONS, Piece, Polyhedron
 from polycorner.polyhedra.strata import distances
 from polycorner.printing import number
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, SEARCH, TOLERANCE, Tolerances
 
@@ -122,6 +123,7 @@ def advice(problem: Problem, q: Array) -> str:
     return f"A manifold with scales=({shown}) would suit the curvatures there."
 
 
+@shown
 def minimise(
     polyhedron: Polyhedron,
     energy: "Energy",
@@ -208,6 +210,7 @@ def minimise(
     return found
 
 
+@shown
 def stationary_on(
     polyhedron: Polyhedron,
     energy: "Energy",

@@ -22,6 +22,7 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, listed, names, number, titled
 from polycorner.progress import Progress, silent
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
@@ -250,6 +251,7 @@ def _is_interval(pair: Any) -> bool:
     return float(pair[0]) < float(pair[1])
 
 
+@shown
 def minima(  # noqa: PLR0913 - all but two are options
     polyhedron: Polyhedron,
     energy: "Energy",

@@ -127,8 +127,8 @@ def accelerations(system: System, state: State) -> Accelerations:
     n = system.manifold.size
     return Accelerations(
         verdict,
-        np.array([a for a, _ in found]).reshape(-1, n),
-        np.array([forces for _, forces in found]).reshape(-1, len(names)),
+        np.array([a for a, _ in found]).reshape(len(found), n),
+        np.array([forces for _, forces in found]).reshape(len(found), len(names)),
         names,
     )
 

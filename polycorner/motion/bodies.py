@@ -198,18 +198,6 @@ class MovingBodies(Value):
         ]
         return (*own, *pair)
 
-    def law(self, i: int, j: int, which: int) -> int:
-        """Return the number of a law among all: of one body, or of a pair, law after law."""
-        own = np.cumsum([0, *(len(kind.body.friction) for kind in self.kinds)]).tolist()
-        if j < 0:
-            return int(own[self.kind_of[i]]) + which
-        before, pair = own[-1], (int(self.kind_of[i]), int(self.kind_of[j]))
-        for known, family in self.families.items():
-            if known == pair:
-                break
-            before += len(family.gaps.names) * len(family.laws)
-        return int(before) + which
-
     @property
     def families(self) -> Mapping[tuple[int, int], PairContacts]:
         """The contacts of any two bodies."""

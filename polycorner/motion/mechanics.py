@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.motion.bodies import MovingBodies
 from polycorner.motion.noise import Solver
 from polycorner.motion.scenes import Scene
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, Value
 
@@ -46,6 +47,7 @@ class MechanicalSystem(Value, ABC):
     def bodies(self) -> MovingBodies:
         """The bodies and their contacts, for the engine."""
 
+    @shown
     @abstractmethod
     def state(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> State:
         """Return a state, after checking that nothing overlaps.

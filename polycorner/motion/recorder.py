@@ -20,7 +20,6 @@ from polycorner.motion.events import EventKind, EventTable, joined
 from polycorner.motion.scenes import FrictionTable, friction_table
 from polycorner.motion.tables import read_events, read_friction, read_touches
 from polycorner.motion.trajectory import Touch, Trajectory
-from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -130,32 +129,57 @@ class Recorder:
 
     def _rubbing(self, instant: int) -> FrictionTable:
         """Return the present friction forces, as those of an instant."""
-        engine = self.engine
-        motion, bodies, model = engine.motion, engine.bodies, engine.model
-        touched = {(some, name) for some, name, _ in self.touching[instant]}
-        laws, families = bodies.rubbing, bodies.families
-        rows: list[tuple[int, int, int]] = []
-        forces: list[Array] = []
-        for at in np.flatnonzero(motion.friction.any(axis=1)).tolist():
-            i = int(np.searchsorted(model.first_friction, at, side="right")) - 1
-            f = at - int(model.first_friction[i])
-            pressed = bodies.kinds[bodies.kind_of[i]].body.friction[f].gap >= 0
-            law = bodies.law(i, -1, f)
-            if motion.alive[i] and (not pressed or ((i,), laws[law].contact) in touched):
-                rows.append((i, -1, law))
-                forces.append(motion.friction[at])
-        for s in np.flatnonzero(motion.pair_flags[: int(motion.counts[CONTACTS]), 1]).tolist():
-            (i, j), g = engine.pair_of(s)
-            family = families[bodies.kind_of[i], bodies.kind_of[j]]
-            if ((i, j), family.gaps.names[g]) not in touched:
-                continue
+        motion, model, bodies = self.engine.motion, self.engine.model, self.engine.bodies
+        found = [(np.zeros((0, 3), dtype=np.int64), np.zeros((0, 2)))]
+        own = 0
+        for kind, at in bodies.slices:
+            rows, gaps = (
+                slice(*first[[at.start, at.stop]])
+                for first in (model.first_friction, model.first_gap)
+            )
+            count = len(kind.body.friction)
+            friction = motion.friction[rows].reshape(kind.count, count, 2)
+            touching = motion.touches[gaps].reshape(kind.count, -1) != 0
+            pressing = np.array([contact.gap for contact in kind.body.friction], dtype=np.int64)
+            acts = np.ones((kind.count, count), dtype=np.bool_)
+            acts[:, pressing >= 0] = touching[:, pressing[pressing >= 0]]
+            acts[motion.alive[at] == 0] = False
+            i, f = np.nonzero(acts & friction.any(axis=2))
+            found.append(
+                (np.column_stack([at.start + i, np.full_like(i, -1), own + f]), friction[i, f])
+            )
+            own += count
+        s = np.flatnonzero(motion.pair_flags[: int(motion.counts[CONTACTS]), 1])
+        key, g = np.divmod(motion.keys[s], max(1, model.most_pair_gaps))
+        both = np.sort(motion.body_of_rank[np.column_stack(np.divmod(key, bodies.total))], axis=1)
+        kinds = bodies.kind_of[both]
+        for (a, b), family in bodies.families.items():
+            here = np.flatnonzero((kinds == (a, b)).all(axis=1))
+            laws = len(family.laws)
             starts = np.cumsum([0, *(law.rows for law in family.laws)]).tolist()
-            for h, (a, b) in enumerate(pairwise(starts)):
-                if (part := motion.pair_impulse[s, 1 + a : 1 + b]).any():
-                    rows.append((i, j, bodies.law(i, j, g * len(family.laws) + h)))
-                    forces.append(np.resize(np.append(part, 0.0), 2))
-        whole = np.array([(instant, *row) for row in rows], dtype=np.int64).reshape(-1, 4)
-        return FrictionTable(whole, np.array(forces).reshape(-1, 2) / engine.dt)
+            for h, (first, last) in enumerate(pairwise(starts)):
+                forces = np.zeros((len(here), 2))
+                forces[:, : last - first] = motion.pair_impulse[s[here], 1 + first : 1 + last]
+                some = forces.any(axis=1)
+                law = own + g[here] * laws + h
+                found.append((np.column_stack([both[here], law])[some], forces[some]))
+            own += laws * len(family.gaps.names)
+        whole, forces = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        instants = np.full((len(whole), 1), instant)
+        table = FrictionTable(np.hstack([instants, whole]), forces / self.engine.dt)
+        return table if instant else self._at_first(table)
+
+    def _at_first(self, table: FrictionTable) -> FrictionTable:
+        """Return the friction of what touches at the start, and of what has a known load."""
+        bodies, touched = self.engine.bodies, {touch[:2] for touch in self.touching[0]}
+        known = {law.contact for law in bodies.rubbing} - {*bodies.contact_names}
+        kept = [
+            ((i,) if j < 0 else (i, j), contact) in touched or contact in known
+            for _, i, j, law in table.whole.tolist()
+            for contact in [bodies.rubbing[law].contact]
+        ]
+        chosen = np.array(kept, dtype=np.bool_)
+        return FrictionTable(table.whole[chosen], table.forces[chosen])
 
     def advance(self, steps: int) -> None:
         """Advance the engine, recording events and the energy that leaves with bodies."""

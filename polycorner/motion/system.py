@@ -36,6 +36,7 @@ from polycorner.motion.placements import bends, check_contacts, check_equations,
 from polycorner.motion.scenes import Scene
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.printing import Printed, Sheet, brief, facts, few, listed, number
+from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import cached_property
 
@@ -342,6 +343,7 @@ class System(MechanicalSystem, Printed):
 
     # -------------------------------------------------------------------------------------- states
 
+    @shown
     def state(
         self, q: ArrayLike | Mapping[str, float], v: ArrayLike | None = None, time: float = 0.0
     ) -> State:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from polycorner.polyhedra.strata import Stratum
 
 ROLLING = "rolling"  # the kind of friction that is a torque
+MOST_COLUMNS = 9  # of coordinates beside each other
 ANGLES = "Angles are in radians, times in s, all else in the units of the system."
 Touch = tuple[tuple[int, ...], str, float]
 
@@ -410,22 +411,20 @@ def _events(path: Trajectory) -> Table:
 
 def _contacts(path: Trajectory) -> Table:
     """Return what touches at last."""
-    touching = path.touching[-1]
-    rows = ((path, *touch) for touch in touching)
-    head = ("contact", "between", "normal force")
-    return listed("Contacts at last", head, starmap(_touch, rows), len(touching), (2,))
+    touching, scene = path.touching[-1], path.system.scene
+    rubbed = path.friction.at(len(path) - 1, path.system.bodies.rubbing)
 
+    def row(bodies: tuple[int, ...], contact: str, force: float) -> tuple[str, ...]:
+        parties = () if scene is None else scene.parties(bodies, contact)
+        between = " and ".join(parties or map(path.system.bodies.called, bodies))
+        friction = "; ".join(
+            f"{kind} {', '.join(number(x, 4) for x in components)}"
+            for kind, components in rubbed.get((bodies, contact), {}).items()
+        )
+        return contact, between, number(force, 6), friction
 
-def _touch(
-    path: Trajectory, bodies: tuple[int, ...], contact: str, force: float
-) -> tuple[str, str, str]:
-    scene = path.system.scene
-    between = () if scene is None else scene.parties(bodies, contact)
-    return (
-        contact,
-        " and ".join(between or map(path.system.bodies.called, bodies)),
-        number(force, 6),
-    )
+    head = ("contact", "between", "normal force", "friction")
+    return listed("Contacts at last", head, starmap(row, touching), len(touching), (2,))
 
 
 def _last(path: Trajectory) -> Iterator[Table]:
@@ -434,6 +433,10 @@ def _last(path: Trajectory) -> Iterator[Table]:
         titles = list(kind.body.formulation.coordinates)
         if isinstance(path.system, System):
             titles = list(map(titled, titles, path.system.manifold.periods))
+        if not label and kind.count == 1 and len(titles) > MOST_COLUMNS:
+            values = ((title, number(x, 6)) for title, x in zip(titles, q[0], strict=True))
+            yield listed("Placement at last", ("coordinate", "value"), values, len(titles), (1,))
+            continue
         first = 1 if label else 0
         called = kind.names if len(kind.names) == kind.count else ()
         rows = (

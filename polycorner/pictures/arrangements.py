@@ -20,6 +20,7 @@ from polycorner.bodies.frames import AXES
 from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.motions import Poses, poses_of
 from polycorner.bodies.shapes import Body
+from polycorner.bodies.sizes import Resized
 from polycorner.bodies.surfaces import outline, surface
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
 from polycorner.checks import refuse, whole
@@ -44,7 +45,7 @@ LIGHT = LightSource(azdeg=315, altdeg=50)
 
 @checked
 def draw_arrangement(
-    arrangement: Arrangement,
+    arrangement: Arrangement | Resized,
     points: ArrayLike,
     *,
     titles: Sequence[str] | None = None,
@@ -63,7 +64,8 @@ def draw_arrangement(
 
     Parameters
     ----------
-    arrangement : Arrangement
+    arrangement : Arrangement, or polyhedron of :func:`thinned` or :func:`scaled`
+        Of the latter for one point.
     points : (N,), (T, N) or (T, n, k) array
         The last for ``n`` bodies like one, such as ``path.q[[-1]]`` of a motion.
     titles : sequence of str, optional
@@ -85,6 +87,9 @@ def draw_arrangement(
         For points of another manifold, another number of titles, or forces that do not belong to
         contacts.
     """
+    if isinstance(arrangement, Resized):
+        at = arrangement.manifold.point(points)
+        arrangement, points = arrangement.at(at), at[:-1]
     poses = poses_of(arrangement, points, "points")
     count = len(poses)
     if titles is not None and len(titles) != count:

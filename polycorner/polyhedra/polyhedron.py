@@ -115,9 +115,10 @@ class Polyhedron(Printed, Value):
     ----------
     manifold : Manifold
         The space of its points.
-    parts : AllOf, AnyOf, SmoothFunction, SymPy expression, sequence or mapping
-        The inequalities ``f >= 0``.  A sequence means all of them; a mapping gives names.
-        Expressions without a name are called ``f1``, ``f2``, ..., or after the group's name.
+    parts : AllOf, AnyOf, SmoothFunction, SymPy expression, sequence or mapping, optional
+        The inequalities ``f >= 0``; without any it is the whole manifold.  A sequence means all of
+        them; a mapping gives names.  Expressions without a name are called ``f1``, ``f2``, ...,
+        or after the group's name.
         ``Min`` and ``Max`` (and ``c - Abs(u)``) that stand outermost in an expression are groups.
     equations : the same kinds, optional
         Functions ``h = 0`` (sections), called ``h1``, ``h2``, ... without a name.
@@ -147,7 +148,7 @@ class Polyhedron(Printed, Value):
     def __init__(
         self,
         manifold: Manifold,
-        parts: Part | Sequence[Any] | Mapping[str, Any],
+        parts: Part | Sequence[Any] | Mapping[str, Any] = (),
         equations: Part | Sequence[Any] | Mapping[str, Any] = (),
         *,
         annotations: Mapping[str, Annotation] | None = None,
@@ -160,9 +161,6 @@ class Polyhedron(Printed, Value):
         flat, sections = collect(manifold, "equations", equations, "h")
         if any(isinstance(node, AnyOf) for node in _groups(flat)):
             msg = "equations: expected functions that all vanish; got an AnyOf"
-            raise ValueError(msg)
-        if not functions and not sections and not manifold.factors:
-            msg = "parts: expected at least one inequality or equation; got none"
             raise ValueError(msg)
         own = normalisations(manifold)
         self.normalised = len(own)

@@ -73,6 +73,7 @@ from polycorner.proofs.parameter_boxes import (
 from polycorner.proofs.proof import DOUBLE_DIGITS, Bounds, Proof
 from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.proofs.witnesses import Gauge
+from polycorner.signatures import shown
 
 if TYPE_CHECKING:
     pass
@@ -87,6 +88,7 @@ ROOM, ROOM_DIGITS = "room", 6
 BOX_DIGITS = 3  # digits beyond those of the enclosures, for the box that contains them
 
 
+@shown
 def prove(
     certificate: Certificate,
     *,

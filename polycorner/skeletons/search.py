@@ -15,6 +15,7 @@ from polycorner.polyhedra.quotients import Quotient, WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.searches import Clock
+from polycorner.signatures import shown
 from polycorner.skeletons.assembly import assembled
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
@@ -32,6 +33,7 @@ EXTENT = 1000.0
 BUDGET = 100_000
 
 
+@shown
 def skeleton(
     polyhedron: Polyhedron,
     starts: ArrayLike,

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.checks import instance, real, reals, refuse
 from polycorner.kinds import checked
 from polycorner.printing import Printed, Sheet, few, listed, number
+from polycorner.signatures import shown
 from polycorner.spaces.arguments import (
     finite,
     given,
@@ -301,6 +302,7 @@ class Manifold(Geometry, Printed):
             raise ValueError(msg)
         return _product((self,) * copies)
 
+    @shown
     def points(self, q: ArrayLike, argument: str = "q") -> Array:
         """Check that ``q`` is one point ``(n,)`` or a batch ``(..., n)`` of finite reals.
 
@@ -324,6 +326,7 @@ class Manifold(Geometry, Printed):
             raise ValueError(msg)
         return finite(array, argument)
 
+    @shown
     def point(self, q: ArrayLike | Mapping[str, float], argument: str = "q") -> Array:
         """Check one point: ``N`` finite reals, or a mapping from coordinate names to them.
 
@@ -359,6 +362,7 @@ class Manifold(Geometry, Printed):
             self.factors.check(points, "q", None)
         return self.canonical(points)
 
+    @shown
     def difference(self, p: ArrayLike, q: ArrayLike) -> Array:
         """Return the shortest tangent vector at ``q`` that leads to ``p``, ``(..., N)``.
 
@@ -373,6 +377,7 @@ class Manifold(Geometry, Printed):
             self.factors.difference(p, q, found)
         return found
 
+    @shown
     def shift(self, q: ArrayLike, v: ArrayLike) -> Array:
         """Return the point reached from ``q`` along the tangent vector ``v``, wrapped.
 
@@ -382,6 +387,7 @@ class Manifold(Geometry, Printed):
         self.factors.check(q, "q", None)
         return self.wrap(self.moved(q, v))
 
+    @shown
     def distance(self, p: ArrayLike, q: ArrayLike) -> Any:
         """Return the distance in scale units, by arcs and angles of rotation, ``(...)``.
 

@@ -181,7 +181,10 @@ def test_a_misspelt_option_is_refused_and_the_right_one_suggested(capsys, name):
     one_line(*run(capsys, name, *first, "--quiet", "--verbose"))
 
 
-@pytest.mark.parametrize(("words", "meant"), [("dyda", "dyad"), ("atlas sphere", "spheres")])
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [("dyda", "dyad"), ("dyadd", "dyad"), ("Minima", "minima"), ("atlas sphere", "spheres")],
+)
 def test_a_misspelt_subcommand_is_refused_and_the_right_one_suggested(capsys, words, meant):
     assert f"'{meant}'" in one_line(*run(capsys, words))
 

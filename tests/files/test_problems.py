@@ -317,7 +317,6 @@ MISTAKES = {
         'coordinates = [{ names = "x", period = 1 }]\ninequalities.f = "x"',
         "the period 1",
     ),
-    "nothing holds": ('coordinates = ["x"]', "at least one inequality"),
     "energy": (SMALL + "energy = 3", "energy"),
     "two energies": (SMALL + 'energy = { minimise = "x", maximise = "x" }', "energy"),
     "energy's formula": (SMALL + 'energy.minimise = "foo(x)"', "energy.minimise"),

@@ -261,11 +261,6 @@ class TestRefusals:
         with pytest.raises(TypeError, match=r"^manifold: "):
             Polyhedron(manifold, x)
 
-    @pytest.mark.parametrize("parts", [[], (), {}, AllOf(), AllOf(AllOf())])
-    def test_nothing_at_all_is_refused(self, parts):
-        with pytest.raises(ValueError, match=r"^parts: expected at least one"):
-            Polyhedron(PLANE, parts)
-
     @pytest.mark.parametrize("parts", [AnyOf(), [x, AnyOf()], AllOf(x, AllOf(AnyOf()))])
     def test_an_empty_union_is_refused(self, parts):
         with pytest.raises(ValueError, match="AnyOf of nothing"):

@@ -67,7 +67,7 @@ VALUES = {
     "Condition": lambda: minimisation.Condition("holds", True, 0.5),
     "Contact": lambda: of.skeleton().contacts["left"],
     "ContactFamily": of.contact_family,
-    "ContactForce": lambda: of.trajectory().contacts(0)[0],
+    "ContactForce": lambda: motion.ContactForce((0,), "bottom", (), 1.5),
     "ContactForces": lambda: motion.contact_forces(of.trajectory(), 0),
     "ConvexPolygon": lambda: motion.ConvexPolygon([[-1, -1], [1, -1], [1, 1], [-1, 1]]),
     "Corner": lambda: of.skeleton().corners[0],
