@@ -37,7 +37,7 @@ def ours() -> tuple[Callable[[], object], Callable[[], float]]:
     torque = TORQUE * sympy.sin(TURN * time_symbol())
     drives = {"motor": Motor("shoulder", torque)}
     system = a.system(gravity=[0, -9.81], friction=MU, drives=drives)
-    start, deepest = system.state(a.point({}, joints=START)), [0.0]
+    start, deepest = system.state(a.point(joints=START)), [0.0]
 
     def task() -> None:
         path = simulate(system, start, STEPS * DT, DT, every=STEPS)

@@ -83,7 +83,7 @@ def hangs() -> bool:
     s = alone.manifold.symbols
     height = s[1] + sympy.sin(s[2]) / 2 + s[y] + sympy.sin(s[x + 2]) / 2
     found = minimise(
-        alone.polyhedron, height, alone.point({}, joints={"shoulder": -1.2, "elbow": -0.9})
+        alone.polyhedron, height, alone.point(joints={"shoulder": -1.2, "elbow": -0.9})
     )
     return found.active == ("lower.v2-floor",) and "minimum: proved" in str(prove(found))
 

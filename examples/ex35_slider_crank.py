@@ -59,8 +59,8 @@ def main() -> Result:
         "gas": Spring("cylinder", stiffness=5.0, length=ROD, damping=0.2),
     }
     system = a.system(drives=drives)
-    q = a.point({})
-    start = system.state(q, a.velocity(q, {}, joints={"shaft": RATE}))
+    q = a.point()
+    start = system.state(q, a.velocity(q, joints={"shaft": RATE}))
     path = simulate(system, start, 2.0, 5e-4, every=10)
     piston = a.joint_values(path.q[:, 0])["cylinder"]
     angle = RATE * path.times

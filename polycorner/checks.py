@@ -5,6 +5,7 @@ kind raises ``TypeError``, one of the right kind that is out of range ``ValueErr
 """
 
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Integral, Real
@@ -308,6 +309,16 @@ def mapping(argument: str, value: object) -> Mapping[Any, Any]:
     if not isinstance(value, Mapping):
         refuse(argument, "a mapping", value, TypeError)
     return value
+
+
+def fits(argument: str, size: float, what: str) -> None:
+    """Raise ValueError if so many bytes do not fit into the memory of this machine."""
+    if "SC_PHYS_PAGES" in getattr(os, "sysconf_names", ()):  # not on every system
+        memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        if size > memory:
+            expected = f"what fits into the memory of this machine, {memory / 1e9:.3g} GB"
+            msg = f"{argument}: expected {expected}; {what} would take {size / 1e9:.3g} GB"
+            raise ValueError(msg)
 
 
 def generator(argument: str, value: object) -> "np.random.Generator":

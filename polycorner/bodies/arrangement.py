@@ -33,7 +33,7 @@ from polycorner.bodies.neighbours import Pair, check_room, check_width, pairs
 from polycorner.bodies.pairs import Tree, apart, both_sharp, distances, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
 from polycorner.bodies.scenes import BodiesInSpace
-from polycorner.bodies.several import assembly
+from polycorner.bodies.several import assembly, check_size
 from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
@@ -395,6 +395,8 @@ class Arrangement(Checked, Printed):
             return assembly(alone, count, given, some, gravity=gravity, density=density)
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1, or numbers by name, for several bodies", count)
+        if len(self.placements) > 1:
+            check_size(self.pairs, self.manifold.size)
         weights = masses_of(self.placements, density, {} if masses is None else masses)
         laws = energies(self.placements, weights, gravity, self.turning)
         friction, rubbing_joints = split(friction, self.joints)
@@ -475,12 +477,14 @@ class Arrangement(Checked, Printed):
         joined = frozenset(name for joint in self.joints.values() for name in joint.bodies)
         return Congruences(self.placements, *around, joined)
 
-    def point(self, placed: Mapping[str, Any], joints: Mapping[str, Any] | None = None) -> Array:
+    def point(
+        self, placed: Mapping[str, Any] | None = None, joints: Mapping[str, Any] | None = None
+    ) -> Array:
         """Return the point of given placements, ``(N,)``.
 
         Parameters
         ----------
-        placed : mapping from str to placement
+        placed : mapping from str to placement, optional
             For every body its origin ``(d,)``, or a pair of this and an angle in radians (in the
             plane) or a :class:`scipy.spatial.transform.Rotation` (in space).  Bodies that joints
             connect with these, with fixed bodies or with space may be left out.
@@ -493,7 +497,8 @@ class Arrangement(Checked, Printed):
         Where joints do not hold, as in closed loops, the nearest point follows at which they do
         (:meth:`closed`).
         """
-        known = completed(self.mechanism, placed, {} if joints is None else joints, self.fixed)
+        given, values = ({} if known is None else known for known in (placed, joints))
+        known = completed(self.mechanism, given, values, self.fixed)
         q = coordinates(known, self.placements)
         return self.closed(q) if self.joints else q
 
@@ -510,10 +515,7 @@ class Arrangement(Checked, Printed):
         return closed(self.polyhedron, self.manifold.point(q))
 
     def joint_function(self, name: str) -> "sympy.Expr":
-        """Return the angle (in radians, up to half a turn) or the position of a joint as a formula.
-
-        Its sign is told at :class:`Hinge` and :class:`Slider`.
-        """
+        """Return the angle of a joint, in radians up to half a turn, or its position: a formula."""
         return self.mechanism.coordinate(checks.instance("name", name, str), "name").value()
 
     def joint_rate(self, name: str) -> "sympy.Expr":
@@ -530,14 +532,17 @@ class Arrangement(Checked, Printed):
 
     @shown
     def velocity(
-        self, q: ArrayLike, moving: Mapping[str, Any], joints: Mapping[str, float] | None = None
+        self,
+        q: ArrayLike,
+        moving: Mapping[str, Any] | None = None,
+        joints: Mapping[str, float] | None = None,
     ) -> Array:
         """Return the velocities of the coordinates ``(N,)`` of bodies that move at a point.
 
         Parameters
         ----------
         q : (N,) array
-        moving : mapping from str to velocity
+        moving : mapping from str to velocity, optional
             For bodies that do not rest the velocity of the origin ``(d,)``, or a pair of this and
             the angular velocity in rad/s: counterclockwise, or ``(3,)`` in the axes of space.
         joints : mapping from str to float, optional
@@ -545,7 +550,7 @@ class Arrangement(Checked, Printed):
             nearest ones along all equations, with these rates.
         """
         point = self.manifold.point(q)
-        found = rates(point, moving, self.placements)
+        found = rates(point, {} if moving is None else moving, self.placements)
         asked = checks.mapping("joints", {} if joints is None else joints)
         checks.names("joints", asked, self.joints)
         if not self.joints:

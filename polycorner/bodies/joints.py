@@ -118,7 +118,7 @@ class Hinge(_Limited):
     >>> a = Arrangement({"A": bar}, joints={"nail": Hinge("world", "A", at=[0, 2], on=[-1, 0])})
     >>> a.polyhedron.equation_names
     ('nail.x', 'nail.y')
-    >>> a.point({}, joints={"nail": -0.5}).round(3).tolist()
+    >>> a.point(joints={"nail": -0.5}).round(3).tolist()
     [0.878, 1.521, -0.5]
     """
 

@@ -1,16 +1,19 @@
 """Systems of many bodies of several kinds, from arrangements of one body each."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations_with_replacement
 from typing import Any
 
 from polycorner import checks
-from polycorner.bodies.dynamics import between, twins
+from polycorner.bodies.dynamics import between, listed_hulls, twins
 from polycorner.bodies.laws import Meeting, laws_of
-from polycorner.bodies.pairs import distances
+from polycorner.bodies.pairs import PlacedPart, both_sharp, distances
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.scenes import KindsInSpace
+from polycorner.checks import fits
 from polycorner.motion.assembly import Assembly
+
+ROWS = 19  # numbers that a gap of a dense system takes for each coordinate
 
 
 def assembly(
@@ -70,8 +73,23 @@ def assembly(
     return Assembly(found, count, families, KindsInSpace(scenes, ordered, met))
 
 
+def check_size(meeting: Sequence[tuple[PlacedPart, PlacedPart]], coordinates: int) -> None:
+    """Raise ValueError if the steps of listed bodies, which are one dense system, do not fit.
+
+    Each gap has rows over all coordinates in several arrays of the engine, and so has its friction.
+    """
+    gaps = sum(len(one.part.points) + len(two.part.points) - 1 for one, two in meeting)
+    what = f"the dense system of {coordinates} coordinates and {gaps} gaps or more"
+    advice = "many bodies are given by kinds and count"
+    fits("bodies", 8.0 * ROWS * coordinates * gaps, f"{what} ({advice})")
+
+
 def _touched(one: Any) -> list[Meeting]:
     """Return the contacts of a single body with walls and fixed bodies."""
-    touches = [t for pair in one.pairs for t in distances(one.manifold, *pair)]
-    found = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
-    return [*found, *(Meeting(t.gap.name, t.member.body, t.name) for t in one.at_walls)]
+    found = [Meeting(t.gap.name, t.member.body, t.name) for t in one.at_walls]
+    for pair in one.pairs:
+        hulls = listed_hulls(*pair, one.scale).names if both_sharp(*pair) else ()
+        smooth = () if both_sharp(*pair) else distances(one.manifold, *pair)
+        names = [*hulls, *(touch.gap.name for touch in smooth)]
+        found += [Meeting(name, pair[0].body, pair[1].body) for name in names]
+    return found

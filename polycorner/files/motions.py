@@ -196,7 +196,7 @@ def motion_coordinates(path: Trajectory, units: MotionUnits) -> dict[str, Any]:
     """Return the coordinates of the dataset of a motion."""
     return {
         "time": column(("time",), path.times, units.time, "time"),
-        "body": np.arange(path.q.shape[1]),
+        "body": np.arange(path.rests.shape[1]),
         "dissipated_by": list(path.dissipated),
         "work_by": list(path.work),
     }

@@ -30,7 +30,9 @@ from polycorner.files.motions import (
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
+from polycorner.motion.assembly import Assembly
 from polycorner.motion.contacts import ContactFamily
+from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.system import System
 from polycorner.motion.tables import read_touches
 from polycorner.motion.trajectory import Trajectory
@@ -40,7 +42,6 @@ if TYPE_CHECKING:
 
 KIND = FileKind("trajectory", "save_trajectory", BINARY)
 OTHERS = ("time", "energy", "force", "impulse", "gap")
-GAP = ("time", "body", "gap")
 NOT_STATED = "not stated"
 
 
@@ -67,31 +68,49 @@ def trajectory_dataset(
     xarray.Dataset
         ``q`` and ``v`` over ``time``, ``body`` and ``coordinate``, ``gaps`` over ``time``,
         ``body`` and ``gap``, energies, contacts, events, dissipation and work by cause, and the
-        computational effort.
+        computational effort.  Of an :class:`~polycorner.motion.Assembly` there are ``q_large`` over
+        ``time``, ``body_large`` and ``coordinate_large``, ..., for each kind.
     """
     import xarray as xr
 
     system = _system(trajectory)
     told = {} if arrangement is None else _arrangement(arrangement, system)
     names("units", units or {}, OTHERS)
-    gaps = {f.unit for f in system.polyhedron.functions if f.unit}
+    kinds = [kind for _, kind in _kinds(system)]
+    gaps = {f.unit for kind in kinds for f in kind.polyhedron.functions if f.unit}
     known = {"time": "s", "gap": gaps.pop() if len(gaps) == 1 else NOT_STATED}
     every = dict.fromkeys(OTHERS, NOT_STATED) | known | dict(units or {})
     motion = MotionUnits(*(every[key] for key in OTHERS[:-1]))
-    own = [unit or NOT_STATED for unit in system.manifold.units]
-    dimensions = ("time", "body", "coordinate")
-    each = {"coordinate_units": json.dumps(own)}
-    data = {
-        "q": (dimensions, trajectory.q, {"long_name": "coordinates, not wrapped"} | each),
-        "v": (dimensions, trajectory.v, {"long_name": f"velocities, per {motion.time}"} | each),
-        "gaps": column(GAP, _gaps(trajectory), every["gap"], "gaps of the contacts"),
-    }
+    data: dict[str, Any] = {}
+    places = motion_coordinates(trajectory, motion)
+    for (end, kind), q, v in zip(
+        _kinds(system),
+        system.bodies.split(trajectory.q),
+        system.bodies.split(trajectory.v),
+        strict=True,
+    ):
+        own = [unit or NOT_STATED for unit in kind.manifold.units]
+        dimensions = ("time", f"body{end}", f"coordinate{end}")
+        each = {"coordinate_units": json.dumps(own)}
+        about = {"long_name": f"velocities, per {motion.time}"} | each
+        data[f"q{end}"] = dimensions, q, {"long_name": "coordinates, not wrapped"} | each
+        data[f"v{end}"] = dimensions, v, about
+        over, values = ("time", f"body{end}", f"gap{end}"), kind.polyhedron.values(q)
+        data[f"gaps{end}"] = column(over, values, every["gap"], "gaps of the contacts")
+        places |= {over[1]: np.arange(q.shape[1]), over[2]: list(kind.contacts)}
+        places[dimensions[2]] = list(kind.manifold.names)
     return xr.Dataset(
         data | motion_data(trajectory, system.bodies.contact_names, motion),
-        motion_coordinates(trajectory, motion)
-        | {"coordinate": list(system.manifold.names), "gap": list(system.contacts)},
+        places,
         _attributes(trajectory, system) | told,
     )
+
+
+def _kinds(system: System | Assembly) -> list[tuple[str, System]]:
+    """Return the kinds of bodies, and how the names of their variables end."""
+    if isinstance(system, System):
+        return [("", system)]
+    return [(f"_{name}", kind) for name, kind in system.kinds.items()]
 
 
 @checked
@@ -133,7 +152,7 @@ def save_trajectory(
 
 
 @checked
-def load_trajectory(path: str | os.PathLike[str], system: System) -> Trajectory:
+def load_trajectory(path: str | os.PathLike[str], system: System | Assembly) -> Trajectory:
     """Read the trajectory of a system back.
 
     The system must be that of the file: coordinates with periods and scales, energies, forces,
@@ -143,7 +162,7 @@ def load_trajectory(path: str | os.PathLike[str], system: System) -> Trajectory:
     ----------
     path : path
         A file that :func:`save_trajectory` wrote.
-    system : System
+    system : System or Assembly
         The system that moved.
 
     Returns
@@ -156,7 +175,8 @@ def load_trajectory(path: str | os.PathLike[str], system: System) -> Trajectory:
         If the file is no trajectory, was changed, or is of another system, naming the first
         difference.
     """
-    instance("system", system, System)
+    if not isinstance(system, Assembly):
+        instance("system", system, System)
     found = load_dataset(KIND, path, lambda content: _read(content, system))
     if isinstance(found, str):
         raise KIND.refusal(path, f"is of another system: {found}")
@@ -183,13 +203,18 @@ def _read_poses(content: "xr.Dataset") -> Poses | None:
     arrangement = read_arrangement("arrangement", json.loads(content.attrs["arrangement"]))
     contacts = forms.many(forms.text)("contacts", json.loads(content.attrs["contacts"]))
     T, N = content["present"].shape
-    if N > 1 and len(arrangement.named) > 1:
-        refuse("arrangement", "one body, which is repeated", [*arrangement.named])
 
     def of(name: str, *shape: int, kind: str = "f", **limits: Any) -> Any:
         return forms.array(name, np.array(content[name].values), kind, shape, **limits)
 
-    q, v = (of(name, T, N, arrangement.manifold.size) for name in ("q", "v"))
+    if "q" in content:
+        if N > 1 and len(arrangement.named) > 1:
+            refuse("arrangement", "one body, which is repeated", [*arrangement.named])
+        q, v = (of(name, T, N, arrangement.manifold.size) for name in ("q", "v"))
+        both = by_kind(arrangement, q), by_kind(arrangement, v)
+    else:
+        sizes = [(f"_{p.name}", p.manifold.size) for p in arrangement.placements]
+        both = tuple([of(name + end, T, -1, n) for end, n in sizes] for name in ("q", "v"))
     present = of("present", T, N, kind="i", least=0, most=1) != 0
     columns = [of(f"touch_{name}", -1, kind="i") for name in ("instant", *PARTICIPANTS)]
     table = {
@@ -197,23 +222,23 @@ def _read_poses(content: "xr.Dataset") -> Poses | None:
         "touch_force": of("touch_force", -1),
     }
     touching = tuple(read_touches(table, contacts, T, N))
-    both = by_kind(arrangement, q), by_kind(arrangement, v)
     times = increasing("time", content["time"].values)
     return recorded(arrangement, times, *both, present, touching)
 
 
-def _arrangement(arrangement: Arrangement, system: System) -> dict[str, str]:
-    known, own = system.manifold.names, instance("arrangement", arrangement, Arrangement)
+def _arrangement(arrangement: Arrangement, system: System | Assembly) -> dict[str, str]:
+    own = instance("arrangement", arrangement, Arrangement)
+    known = tuple(name for _, kind in _kinds(system) for name in kind.manifold.names)
     if own.manifold.names != known:
         refuse("arrangement", f"one of the coordinates {', '.join(known)}", own.manifold.names)
     return {"arrangement": json.dumps(arrangement_entry(own))}
 
 
-def _system(trajectory: Trajectory) -> System:
+def _system(trajectory: Trajectory) -> System | Assembly:
     if not isinstance(trajectory, Trajectory):
         msg = f"trajectory: expected a Trajectory; got {type(trajectory).__name__}"
         raise TypeError(msg)
-    if not isinstance(trajectory.system, System):
+    if not isinstance(trajectory.system, System | Assembly):
         msg = (
             "trajectory: expected that of a System; got one of "
             f"{type(trajectory.system).__name__}: save_run keeps runs in the drum"
@@ -222,7 +247,7 @@ def _system(trajectory: Trajectory) -> System:
     return trajectory.system
 
 
-def _attributes(trajectory: Trajectory, system: System) -> dict[str, Any]:
+def _attributes(trajectory: Trajectory, system: System | Assembly) -> dict[str, Any]:
     return {
         "title": "Motion of a system with unilateral contacts",
         **motion_attributes(trajectory, system.bodies.contact_names),
@@ -230,8 +255,17 @@ def _attributes(trajectory: Trajectory, system: System) -> dict[str, Any]:
     }
 
 
-def _told(system: System) -> dict[str, Any]:
+def _told(system: System | Assembly) -> dict[str, Any]:
     """Return a system as plain values, formulas as text."""
+    if isinstance(system, System):
+        return _body(system) | {"count": system.count, "between": _between(system.between)}
+    bodies = {f"kind {name}": _body(kind) for name, kind in system.kinds.items()}
+    pairs = {f"between {a} and {b}": _between(f) for (a, b), f in system.between.items()}
+    return bodies | pairs | {"count": dict(system.count)}
+
+
+def _body(system: System) -> dict[str, Any]:
+    """Return one body of a system."""
     text = formula_text
     manifold, polyhedron = system.manifold, system.polyhedron
     friction = {
@@ -242,7 +276,7 @@ def _told(system: System) -> dict[str, Any]:
         ]
         for f in system.friction
     }
-    told = {
+    told: dict[str, Any] = {
         "coordinates": list(manifold.names),
         "periods": [str(period) for period in manifold.periods],
         "scales": list(manifold.scales),
@@ -255,23 +289,26 @@ def _told(system: System) -> dict[str, Any]:
         "gaps": {f.name: [text(f.expression), *f.parameters] for f in polyhedron.functions},
         "equations": {h.name: [text(h.expression), *h.parameters] for h in polyhedron.stated},
     }
-    family = system.between
-    between = family and family.described()
-    if isinstance(family, ContactFamily):
-        between = {
-            "gaps": {name: text(gap) for name, gap in family.gaps.items()},
-            "friction": [
-                [
-                    {name: [*map(_slip, slip)] for name, slip in law.slip.items()},
-                    f"{law.static}, {law.moving}",
-                ]
-                for law in family.friction
-            ],
-            "restitution": family.restitution,
-        }
     if system.hulls:
         told["hulls"] = [hulls.described() for hulls in system.hulls]
-    return told | {"count": system.count, "between": between}
+    return told
+
+
+def _between(family: ContactFamily | HullContacts | None) -> dict[str, Any] | None:
+    """Return the contacts of two bodies."""
+    if isinstance(family, HullContacts):
+        return family.described()
+    return family and {
+        "gaps": {name: formula_text(gap) for name, gap in family.gaps.items()},
+        "friction": [
+            [
+                {name: [*map(_slip, slip)] for name, slip in law.slip.items()},
+                f"{law.static}, {law.moving}",
+            ]
+            for law in family.friction
+        ],
+        "restitution": family.restitution,
+    }
 
 
 def _slip(component: Any) -> Any:
@@ -291,14 +328,22 @@ def _digest(family: Family) -> str:
     return family.program().digest()
 
 
-def _read(content: "xr.Dataset", system: System) -> "str | Trajectory":
+def _read(content: "xr.Dataset", system: System | Assembly) -> "str | Trajectory":
     written, here = json.loads(content.attrs["system"]), _told(system)
     for key, value in here.items():
+        if "count" in written and key not in written:  # of one kind and of several
+            return f"{key}: written nothing, found {value}"
         if written[key] != value:
             return f"{key}: written {written[key]}, found {value}"
-    q, v = (np.array(content[name].values) for name in ("q", "v"))
-    return read_motion(content, system, q, v)
-
-
-def _gaps(trajectory: Trajectory) -> Any:
-    return _system(trajectory).polyhedron.values(trajectory.q)
+    q, v = (
+        [np.array(content[name + end].values) for end, _ in _kinds(system)] for name in ("q", "v")
+    )
+    if isinstance(system, System):
+        return read_motion(content, system, q[0], v[0])
+    # Each has the shape of its kind: together they might have the right size otherwise.
+    for kind, *each in zip(system.bodies.kinds, q, v, strict=True):
+        shape = len(content["time"]), kind.count, kind.dimension
+        for array in each:
+            forms.array("q", array, "f", shape)
+    joined = [np.concatenate([a.reshape(len(a), -1) for a in every], axis=1) for every in (q, v)]
+    return read_motion(content, system, *joined)

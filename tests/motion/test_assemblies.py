@@ -1,11 +1,14 @@
 """Many bodies of several kinds: alike kinds are one, single ones a list, each has its own laws."""
 
+import os
+
 import numpy as np
 import pytest
 import sympy
 
 from polycorner import Manifold, Polyhedron, System, velocities
-from polycorner.bodies import Arrangement, HalfSpace, capsule, disc
+from polycorner.bodies import Arrangement, HalfSpace, capsule, disc, sphere
+from polycorner.files import load_trajectory, save_trajectory
 from polycorner.motion import (
     Assembly,
     Checkpoint,
@@ -16,6 +19,7 @@ from polycorner.motion import (
     pair_coordinates,
     simulate,
 )
+from polycorner.motion.simulation import start
 
 BOX = {
     "floor": HalfSpace([0, 1], [0, 0]),
@@ -94,9 +98,9 @@ def test_single_bodies_of_several_kinds_move_as_if_they_were_listed():
     arrangement, counts = scene()
     listed = arrangement.system(gravity=GRAVITY)
     kinds = arrangement.system(gravity=GRAVITY, count=counts)
-    start = np.concatenate([*STARTS.values()])
+    begin = np.concatenate([*STARTS.values()])
     solver = Solver()
-    first = simulate(listed, listed.state(start), 0.8, 1e-3, solver=solver)
+    first = simulate(listed, listed.state(begin), 0.8, 1e-3, solver=solver)
     second = simulate(
         kinds, kinds.state({k: [q] for k, q in STARTS.items()}), 0.8, 1e-3, solver=solver
     )
@@ -120,8 +124,8 @@ def mixture():
         gravity=GRAVITY, friction=mu, count=counts, restitution={"small": 0.5}
     )
     flat = np.column_stack([rows(4, 1.3)[:, :2] * [1, 0.3] + [0, 0.1], np.zeros(4)])
-    start = {"rod": flat, "large": rows(6, 0.6, low=1.5), "small": rows(12, 0.3, low=3.0, seed=1)}
-    return system, simulate(system, system.state(start), 1.5, 2e-3)
+    begin = {"rod": flat, "large": rows(6, 0.6, low=1.5), "small": rows(12, 0.3, low=3.0, seed=1)}
+    return system, simulate(system, system.state(begin), 1.5, 2e-3)
 
 
 def test_a_mixture_keeps_its_books(mixture):
@@ -169,6 +173,19 @@ def test_bodies_have_the_names_of_their_kinds(mixture):
         path["tiny"]
 
 
+def test_a_mixture_in_a_file_is_the_same(mixture, tmp_path):
+    system, path = mixture
+    saved = save_trajectory(path, tmp_path / "mixture.nc")
+    loaded = load_trajectory(saved, system)
+    for name in ("q", "v", "rests", "present", "kinetic"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(path, name))
+    assert loaded.events == path.events
+    assert loaded.touching == path.touching
+    fewer = Assembly(system.kinds, system.count | {"rod": 3}, system.between)
+    with pytest.raises(ValueError, match="is of another system: count"):
+        load_trajectory(saved, fewer)
+
+
 def test_forces_obey_the_laws_of_their_pairs(mixture):
     """Static coefficients limit what rubs: a kind without friction on a wall dissipates nothing."""
     system, _ = mixture
@@ -199,8 +216,8 @@ def test_a_run_of_kinds_goes_on_from_its_checkpoint(tmp_path):
     arrangement, _ = scene()
     system = arrangement.system(gravity=GRAVITY, count={"rod": 2, "disc": 2, "peg": 2})
     shifted = {k: [q, [q[0] + 4.0, *q[1:]]] for k, q in STARTS.items()}
-    start, noise = system.state(shifted), Noise(kicks={"xpeg": 0.1, "thetarod": 0.1}, seed=4)
-    whole = simulate(system, start, 0.4, 1e-3, every=20, noise=noise)
+    begin, noise = system.state(shifted), Noise(kicks={"xpeg": 0.1, "thetarod": 0.1}, seed=4)
+    whole = simulate(system, begin, 0.4, 1e-3, every=20, noise=noise)
 
     def stop(done, *_):
         if done > 0.2:
@@ -208,8 +225,8 @@ def test_a_run_of_kinds_goes_on_from_its_checkpoint(tmp_path):
 
     saved = Checkpoint(tmp_path, seconds=0.0)
     with pytest.raises(KeyboardInterrupt):
-        simulate(system, start, 0.4, 1e-3, every=20, noise=noise, progress=stop, checkpoint=saved)
-    resumed = simulate(system, start, 0.4, 1e-3, every=20, noise=noise, checkpoint=saved)
+        simulate(system, begin, 0.4, 1e-3, every=20, noise=noise, progress=stop, checkpoint=saved)
+    resumed = simulate(system, begin, 0.4, 1e-3, every=20, noise=noise, checkpoint=saved)
     np.testing.assert_array_equal(resumed.q, whole.q)
     assert resumed.events == whole.events
     assert resumed.touching == whole.touching
@@ -229,8 +246,8 @@ def test_masses_of_two_kinds_exchange_momentum():
     pair = Assembly(
         {"heavy": heavy, "light": light}, {"heavy": 1, "light": 2}, {("heavy", "light"): meet}
     )
-    start = pair.state({"heavy": [[0.0]], "light": [[3.0], [-40.0]]}, {"heavy": [[2.0]]})
-    path = simulate(pair, start, 2.0, 1e-2)
+    begin = pair.state({"heavy": [[0.0]], "light": [[3.0], [-40.0]]}, {"heavy": [[2.0]]})
+    path = simulate(pair, begin, 2.0, 1e-2)
     assert path.v[-1].tolist() == pytest.approx([1.0, 3.0, 0.0])
     assert [e.bodies for e in path.events] == [(0, 1)]
 
@@ -239,11 +256,67 @@ def test_bodies_of_a_kind_leave_at_its_limit():
     heavy = line(3.0)
     light = System(line(1.0, "y").polyhedron, line(1.0, "y").kinetic, exits={"y": 1.0})
     system = Assembly({"heavy": heavy, "light": light}, {"heavy": 2, "light": 2})
-    start = system.state([0.0, 2.0, 0.5, -5.0], [5.0, 0.0, 1.0, 1.0])
-    path = simulate(system, start, 1.0, 1e-2)
+    begin = system.state([0.0, 2.0, 0.5, -5.0], [5.0, 0.0, 1.0, 1.0])
+    path = simulate(system, begin, 1.0, 1e-2)
     assert path["heavy"].present.all()
     assert path["light"].present[-1].tolist() == [False, True]
     assert [(e.bodies, e.kind) for e in path.events] == [((2,), EventKind.EXIT)]
+
+
+def test_spheres_and_rods_in_space_keep_their_books():
+    """Bodies of three and of six coordinates, of which these have an equation."""
+    room = {"floor": HalfSpace([0, 0, 1], [0, 0, 0]), "side": HalfSpace([1, 0, 0], [0, 0, 0])}
+    bodies = {"ball": sphere(0.5), "rod": capsule([-0.5, 0, 0], [0.5, 0, 0], 0.3)}
+    system = Arrangement(bodies, room).system(
+        gravity=[0, 0, -10], count={"ball": 3, "rod": 2}, restitution=1.0
+    )
+    balls = [[1, 1, 0.6], [2.2, 1, 0.6], [1, 2.2, 1.7]]
+    rods = [[1.6, 1.0, 1.6, 1, 0, 0], [1.2, 2.2, 3.0, 0, 1, 0]]
+    path = simulate(system, system.state({"ball": balls, "rod": rods}), 0.5, 5e-4)
+    assert [kind.dimension for kind in system.bodies.kinds] == [3, 6]
+    assert any(len(e.bodies) == 2 for e in path.of_kind(EventKind.IMPACT))
+    np.testing.assert_allclose(np.linalg.norm(path["rod"].q[..., 3:], axis=2), 1.0, atol=1e-9)
+    energy = path.kinetic + path.potential
+    assert np.ptp(energy) < 1e-3 * path.kinetic.max()
+
+
+def test_kinds_in_a_periodic_box_keep_energy_and_momentum():
+    gas = Arrangement({"a": disc(0.5), "b": disc(0.3)}, period=[4.0, 4.0])
+    system = gas.system(count={"a": 4, "b": 5}, restitution=1.0)
+    rng = np.random.default_rng(0)
+    places = np.array([(0.6 + 1.3 * i, 0.6 + 1.3 * j) for i in range(3) for j in range(3)])
+    path = simulate(system, system.state(places.ravel(), rng.normal(size=18)), 3.0, 1e-3)
+    masses = np.pi * np.repeat([0.25, 0.09], [4, 5])
+    momentum = np.einsum("i,tik->tk", masses, path.v.reshape(len(path), 9, 2))
+    assert len(path.of_kind(EventKind.IMPACT)) > 10
+    np.testing.assert_allclose(momentum, momentum[[0]].repeat(len(path), 0), atol=1e-12)
+    np.testing.assert_allclose(path.kinetic, path.kinetic[0], rtol=1e-12)
+
+
+def test_towers_in_space_are_neighbours_of_what_is_near():
+    """Of two columns of balls each has the one above and the one below as neighbours."""
+    floor = {"floor": HalfSpace([0, 0, 1], [0, 0, 0])}
+    system = Arrangement({"a": sphere(0.5), "b": sphere(0.5)}, floor).system(
+        gravity=[0, 0, -10], count={"a": 6, "b": 6}
+    )
+    tower = np.array([(0.0, 0.0, 0.5 + i) for i in range(6)])
+    engine = start(system, system.state({"a": tower, "b": tower + np.array([3.0, 0, 0])}), 1e-3)
+    engine.advance(1)
+    listed = engine.work.neighbours.pairs[: engine.work.neighbours.status[0]]
+    assert sorted(map(tuple, listed.tolist())) == [(i, i + 1) for i in range(11) if i != 5]
+
+
+def test_what_does_not_fit_is_refused_with_its_size(monkeypatch):
+    listed = Arrangement({name: disc(1) for name in "ABCDEFGH"})
+    many = Arrangement({"A": disc(1), "B": disc(2)}, BOX).system(count={"A": 200, "B": 2})
+    state = many.state(np.concatenate([rows(200, 1.0)[:, :2].ravel(), [3, 90, 8, 90]]))
+    monkeypatch.setattr(os, "sysconf", lambda _: 2**8)
+    with pytest.raises(
+        ValueError, match=r"bodies: .* the dense system of 16 coordinates and 28 gaps"
+    ):
+        listed.system()
+    with pytest.raises(ValueError, match=r"count: .* the steps of 202 bodies with 606 gaps"):
+        simulate(many, state, 1.0, 1e-3)
 
 
 def test_bad_assemblies_are_refused():

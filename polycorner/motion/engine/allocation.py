@@ -22,6 +22,17 @@ LINE = 8  # numbers in a cache line, into which whole vectors fit
 Record = TypeVar("Record", Model, EngineState, Log)
 
 
+def size_of(sizes: Sizes) -> float:
+    """Return how many bytes state, workspace and log take, but for the matrix of an island.
+
+    Of that memory is used as islands grow.
+    """
+    records = [EngineState, Log, *get_type_hints(Work).values()]
+    arrays = [declared for record in records for declared in declarations(record).values()]
+    whole = sum(float(prod(declared.extents(sizes))) for declared in arrays)
+    return 8.0 * (whole - sizes.M)
+
+
 def workspace(sizes: Sizes) -> Work:
     """Return a new workspace."""
     return Work(**{name: allocate(part, sizes) for name, part in get_type_hints(Work).items()})

@@ -6,10 +6,17 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.checks import fits, refuse
 from polycorner.errors import SolverError
 from polycorner.formulas.tables import Layout
 from polycorner.motion.bodies import MovingBodies
-from polycorner.motion.engine.allocation import allocate, own_workspace, restored, workspace
+from polycorner.motion.engine.allocation import (
+    allocate,
+    own_workspace,
+    restored,
+    size_of,
+    workspace,
+)
 from polycorner.motion.engine.arrays import (
     CONTACTS,
     CONTACTS_FULL,
@@ -35,6 +42,7 @@ from polycorner.motion.noise import Noise, Solver
 from polycorner.spaces.manifold import Array
 
 CONTACTS_PER_BODY = 8  # for which there is room at first
+LARGEST_KEY = 2.0**63
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,7 @@ class Engine:
         self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
         self.capacity = max(16, CONTACTS_PER_BODY * bodies.total)
         self._own = _own_contacts(bodies)
+        self._check_size()
         self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start, self.dt)
         self.motion = allocate(EngineState, self._sizes)
         self.motion.q[:], self.motion.v[:], self.motion.sticks[:] = q, v, np.ravel(sticking)
@@ -106,6 +115,15 @@ class Engine:
     @property
     def _sizes(self) -> Sizes:
         return Sizes.of(self.bodies, self.capacity)
+
+    def _check_size(self) -> None:
+        """Raise ValueError if there are more bodies or contacts than memory and keys can hold."""
+        sizes, N = self._sizes, self.bodies.total
+        what = f"the steps of {N} bodies with {sizes.U} gaps to their surroundings"
+        fits("count", size_of(sizes), what)
+        # Keys of pairs are sorted with an index as their last digit.
+        if float(N) * N * max(1, sizes.G) * sizes.C >= LARGEST_KEY:
+            refuse("count", "bodies whose contacts can be numbered in 63 bits", N)
 
     def _allocate(self) -> None:
         """Allocate the workspace, and tell compiled code where everything is."""
@@ -174,6 +192,7 @@ class Engine:
             raise SolverError(msg)
         self.capacity *= 2
         try:
+            self._check_size()
             self.load(self.save())
         except ValueError as error:
             msg = f"{error}, at t = {self.time:.6g}"
