@@ -30,7 +30,7 @@ from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.mechanisms import Mechanism, check_joints, closed, completed, moved_along
 from polycorner.bodies.neighbours import Pair, check_room, check_width, pairs
-from polycorner.bodies.pairs import Tree, apart, both_sharp, distances, members
+from polycorner.bodies.pairs import Touch, Tree, apart, both_sharp, distances, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
 from polycorner.bodies.scenes import BodiesInSpace
 from polycorner.bodies.several import assembly, check_size
@@ -39,6 +39,7 @@ from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.assembly import Assembly
+from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -403,16 +404,18 @@ class Arrangement(Checked, Printed):
         holders = [WORLD, *self.fixed, *self.named]
         of_joints = self.mechanism, self.manifold, holders
         laws, moved = driven(*of_joints, laws, drives, forces, rubbing_joints)
-        touches, hulls = [], []
+        touches: list[Touch] = []
+        hulls: list[tuple[HullContacts, Pair]] = []
         for pair in self.pairs:
             if both_sharp(*pair):
-                hulls.append((listed_hulls(*pair, self.scale), pair))
+                hulls.append((listed_hulls(pair[0], pair[1], self.scale), pair))
             else:
                 touches += distances(self.manifold, *pair)
         meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
         meetings += [Meeting(n, a.body, b.body) for one, (a, b) in hulls for n in one.names]
         meetings += [Meeting(t.gap.name, t.member.body, t.name) for t in self.at_walls]
-        meetings += [Meeting(end, *[end.rpartition(".")[0]] * 2) for end in self.mechanism.limits]
+        ends = {end: end.rpartition(".")[0] for end in self.mechanism.limits}
+        meetings += [Meeting(end, joint, joint) for end, joint in ends.items()]
         family, first = None, self.placements[0]
         if count > 1:
             meetings.append(Meeting(f"{first.name}-{first.name}", first.name, first.name, True))
@@ -421,7 +424,7 @@ class Arrangement(Checked, Printed):
             check_width(self.lattice, [first.body], [*self.fixed.values()])
             family = between((first, first), self.lattice, known)
         placed = self._joined(self.contacts(excluded=False, sharp=False))
-        rubbing = tuple(rubbing_hulls(one, *pair, known) for one, pair in hulls)
+        rubbing = tuple(rubbing_hulls(one, pair[0], pair[1], known) for one, pair in hulls)
         every = [*placed.names, *(name for one in rubbing for name in one.names)]
         return System(
             placed,

@@ -336,7 +336,7 @@ def between_hulls(
     )
     return HullContacts(
         [(first, second) for first in one for second in two],
-        tuple(p.manifold.size for p in placements),
+        (placements[0].manifold.size, placements[1].manifold.size),
         OPTIONS.parting * scale,
         OPTIONS.touching * scale,
         lattice.lengths.tolist(),

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies import link_laws
-from polycorner.bodies.arrangement import check_together, coordinates
+from polycorner.bodies.arrangement import check_together
 from polycorner.bodies.chains import (
     Moving,
     Pose,
@@ -22,7 +22,6 @@ from polycorner.bodies.chains import (
     moved,
     still,
 )
-from polycorner.bodies.dynamics import smooth
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
 from polycorner.bodies.link_parts import CarriedPart, affine, carried_parts, gaps_of, touch
@@ -30,10 +29,10 @@ from polycorner.bodies.link_trees import WORLD, LinkTree
 from polycorner.bodies.links import RobotJoint, RobotLink
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.pairs import PlacedPart, Tree, apart
-from polycorner.bodies.poses import Placement, frame_of
+from polycorner.bodies.poses import Placement, coordinates, frame_of
 from polycorner.bodies.rigid_motions import number
 from polycorner.bodies.shapes import Body, Part
-from polycorner.bodies.walls import HalfSpace, Wall, within
+from polycorner.bodies.walls import HalfSpace, Wall, WallTouch, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
@@ -180,7 +179,9 @@ class Robot(Checked):
             found += carried_parts(name, body, name, is_linked=False)
         return found
 
-    # --------------------------------------------------------------------------------- the space
+    def __repr__(self) -> str:
+        """Return how many links there are, and the joints that are coordinates."""
+        return f"Robot({len(self.links)} links, joints {', '.join(self._tree.free)})"
 
     @property
     def dimension(self) -> int:
@@ -314,7 +315,7 @@ class Robot(Checked):
             )
             for one, two in pairs
         ]
-        found += [function for _, function, *_ in self._at_walls]
+        found += [met.gap for _, met in self._at_walls]
         found = [*together(found), *self._limits]
         if not found:
             refuse("links", "something that links can touch, or limits of joints", [*self.links])
@@ -342,15 +343,15 @@ class Robot(Checked):
             yield (one, two) if one.carrier else (two, one)  # what stands in space is the second
 
     @cached_property
-    def _at_walls(self) -> list[tuple[str, SmoothFunction, CarriedPart, Array]]:
-        """The gaps at walls with their walls, parts and points."""
+    def _at_walls(self) -> list[tuple[CarriedPart, WallTouch]]:
+        """The gaps at walls, with the parts that they are of."""
         ignored = {frozenset(pair) for pair in self.ignored}
         return [
-            (name, function, one, point)
+            (one, met)
             for name, wall in self.walls.items()
             for one in self._carried
             if one.carrier != WORLD and frozenset((one.link, name)) not in ignored
-            for function, point in within(self.manifold, name, wall, self._linked(one, WORLD))
+            for met in within(self.manifold, name, wall, self._linked(one, WORLD))
         ]
 
     @cached_property
@@ -441,7 +442,13 @@ class Robot(Checked):
             if step.kind == "free":
                 beyond = [m for c, m in inertias.items() if m and carrier in self._tree.path(c)]
                 kinetic += link_laws.along_norm(step, beyond, self._rates)
-        polyhedron = smooth(Polyhedron(self.manifold, AllOf(*self._contacts(excluded=False))))
+        polyhedron = Polyhedron(self.manifold, AllOf(*self._contacts(excluded=False)))
+        if polyhedron.is_union:
+            msg = (
+                "links: expected rounded links (radius > 0) for motion; two sharp polygons or "
+                "polyhedra are apart in one of several ways, of which a robot chooses none"
+            )
+            raise NotImplementedError(msg)
         given = checks.mapping("torques", {} if torques is None else torques)
         checks.names("torques", given, self._tree.free)
         driven = link_laws.forces(self.joints, self._rates, given)
@@ -452,14 +459,15 @@ class Robot(Checked):
         """Yield the friction of links and bodies at half-spaces."""
         by_wall = given if isinstance(given, Mapping) else dict.fromkeys(self.walls, given)
         checks.names("friction", by_wall, self.walls)
-        for name, function, one, point in self._at_walls:
+        for one, met in self._at_walls:
+            name, wall = met.name, met.wall
             mu = checks.real("friction", by_wall.get(name, 0.0), least=0)
-            wall = self.walls[name]
             if mu and not isinstance(wall, HalfSpace):
                 refuse("friction", f"0 for {name!r}, which is no half-space", mu)
             if mu and isinstance(wall, HalfSpace):
-                slip = link_laws.slips(self._motions[one.carrier], point, one.part.radius, wall)
-                yield Friction(f"{function.name} slips", slip, Disc(mu), function.name)
+                moving, radius = self._motions[one.carrier], one.part.radius
+                slip = link_laws.slips(moving, met.point, radius, wall)
+                yield Friction(f"{met.gap.name} slips", slip, Disc(mu), met.gap.name)
 
     @cached_property
     def _rates(self) -> "dict[str, sympy.Symbol]":

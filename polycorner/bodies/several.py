@@ -88,7 +88,7 @@ def _touched(one: Any) -> list[Meeting]:
     """Return the contacts of a single body with walls and fixed bodies."""
     found = [Meeting(t.gap.name, t.member.body, t.name) for t in one.at_walls]
     for pair in one.pairs:
-        hulls = listed_hulls(*pair, one.scale).names if both_sharp(*pair) else ()
+        hulls = listed_hulls(pair[0], pair[1], one.scale).names if both_sharp(*pair) else ()
         smooth = () if both_sharp(*pair) else distances(one.manifold, *pair)
         names = [*hulls, *(touch.gap.name for touch in smooth)]
         found += [Meeting(name, pair[0].body, pair[1].body) for name in names]

@@ -52,6 +52,11 @@ class Solid(Checked):
     volume: float
     difference: float
 
+    def __repr__(self) -> str:
+        """Return the mass and the parts."""
+        parts = f"{len(self.body.parts)} convex parts of {len(self.body.markers)} points"
+        return f"Solid(mass {self.mass.mass:g}, {parts}, difference {self.difference:.2g})"
+
 
 @dataclass(frozen=True)
 class MeshOptions(Checked):
@@ -145,7 +150,8 @@ def read_mesh(
     density = checks.real("density", density, above=0)
     is_closed = mesh.is_watertight and mesh.is_winding_consistent
     body = convex_body(about, mesh, parts, options)
-    filled = math.fsum(float(ConvexHull(part.points).volume) for part in body.parts.values())
+    volumes = [float(_hull(about, part.points).volume) for part in body.parts.values()]
+    filled = math.fsum(volumes)
     volume = float(mesh.volume) if is_closed else filled
     with checks.about(about):
         mass = mass_of(body, density)
@@ -247,7 +253,7 @@ def _pieces(about: str, mesh: Any, parts: str, concavity: float) -> Iterable[Arr
     components = mesh.split(only_watertight=False)
     if any(c.volume <= 0 for c in components):
         components = [mesh]  # with cavities, whose walls are components
-    convex = [_is_convex(c) for c in components]
+    convex = [_is_convex(about, c) for c in components]
     if parts == "exact" and not all(convex):
         expected = "convex components; parts='convex' cuts others, parts='hull' fills them"
         refuse(about, expected, f"{convex.count(False)} of {len(convex)} that are not")
@@ -258,13 +264,13 @@ def _pieces(about: str, mesh: Any, parts: str, concavity: float) -> Iterable[Arr
     ]
 
 
-def _is_convex(mesh: Any) -> bool:
+def _is_convex(about: str, mesh: Any) -> bool:
     """Whether a closed mesh is the surface of its hull.
 
     A triangle whose corners and centre lie on that surface lies on it as a whole, and a closed
     surface which does so has a multiple of its volume.
     """
-    hull = ConvexHull(mesh.vertices)
+    hull = _hull(about, mesh.vertices)
     if not math.isclose(mesh.volume, hull.volume, rel_tol=DEFAULT.beside):
         return False
     deepest, points = -DEFAULT.same * mesh.scale, [*mesh.vertices, *mesh.triangles_center]
@@ -292,10 +298,7 @@ def corners(about: str, points: Array) -> Array:
 
     Only those are looked at whose faces have normals close to one plane.
     """
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        refuse(about, "parts that have an interior", "a flat one")
+    hull = _hull(about, points)
     height = DEFAULT.same * float(np.ptp(points, axis=0).max())
     vertices: Any = hull.vertices.tolist()
     normals: dict[int, list[Array]] = {i: [] for i in vertices}
@@ -313,15 +316,22 @@ def corners(about: str, points: Array) -> Array:
             continue  # the others lie in a plane
         if (rest[:, :3] @ points[i] + rest[:, 3]).max() <= height:
             kept = others
-    return _flattened(np.array(points[kept], dtype=np.float64), height)
+    return _flattened(about, np.array(points[kept], dtype=np.float64), height)
 
 
-def _flattened(points: Array, height: float) -> Array:
+def _hull(about: str, points: Array) -> ConvexHull:
+    try:
+        return ConvexHull(points)
+    except QhullError:
+        refuse(about, "parts that have an interior", f"one of the sizes {np.ptp(points, axis=0)}")
+
+
+def _flattened(about: str, points: Array, height: float) -> Array:
     """Return vertices shifted into the planes of their faces, where single precision put them off.
 
     Where more than three faces meet that is not possible for all of them.
     """
-    hull = ConvexHull(points)
+    hull = _hull(about, points)
     heights = hull.equations[:, :3] @ points.T + hull.equations[:, 3:]
     planes: list[list[tuple[Array, float]]] = [[] for _ in points]
     for face in dict.fromkeys(tuple(np.flatnonzero(row >= -height).tolist()) for row in heights):
@@ -362,13 +372,13 @@ def _at_most(about: str, points: Array, options: MeshOptions) -> Array:
     return points[chosen]
 
 
-def capsule_around(given: Array) -> Body:
+def capsule_around(given: Array, about: str = "points") -> Body:
     """Return the least of the capsules along the principal axes of points.
 
     Around an axis the radius is that of the least circle around the points seen along it; each end
     is as far inside as the half ball allows.
     """
-    hull = given[ConvexHull(given).vertices]
+    hull = given[_hull(about, given).vertices]
     middle = hull.mean(axis=0)
     axes = np.linalg.svd(hull - middle, full_matrices=False)[2]
     best: tuple[float, Body] | None = None

@@ -262,7 +262,7 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         rubbing = {"rub": np.stack(whole, axis=1), "rub_force": np.stack(forces, axis=1)}
     numbers = np.stack([of("event_time", -1), of("event_impulse", -1)], axis=1)
     events = {"event": table("event", "kind"), "event_numbers": numbers}
-    whole = {
+    costs = {
         name: checks.whole(f"effort_{name}", at[f"effort_{name}"], least=0)
         for name in EFFORT
         if name != "residual"
@@ -283,7 +283,7 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
         events=read_events(events, names, bodies.total),
         max_penetration=checks.real("max_penetration", at["max_penetration"], least=0),
         effort=Effort(
-            **whole,
+            **costs,
             residual=checks.real("effort_residual", at["effort_residual"], least=0, infinite=True),
         ),
         noise=_noise(at),

@@ -214,7 +214,8 @@ def _read_poses(content: "xr.Dataset") -> Poses | None:
         both = by_kind(arrangement, q), by_kind(arrangement, v)
     else:
         sizes = [(f"_{p.name}", p.manifold.size) for p in arrangement.placements]
-        both = tuple([of(name + end, T, -1, n) for end, n in sizes] for name in ("q", "v"))
+        places, rates = ([of(name + end, T, -1, n) for end, n in sizes] for name in ("q", "v"))
+        both = places, rates
     present = of("present", T, N, kind="i", least=0, most=1) != 0
     columns = [of(f"touch_{name}", -1, kind="i") for name in ("instant", *PARTICIPANTS)]
     table = {
@@ -298,7 +299,9 @@ def _between(family: ContactFamily | HullContacts | None) -> dict[str, Any] | No
     """Return the contacts of two bodies."""
     if isinstance(family, HullContacts):
         return family.described()
-    return family and {
+    if family is None:
+        return None
+    return {
         "gaps": {name: formula_text(gap) for name, gap in family.gaps.items()},
         "friction": [
             [

@@ -26,6 +26,7 @@ from polycorner.files.meshes import MeshOptions, capsule_around, convex_body, lo
 from polycorner.files.safe_paths import content, name_of, within
 from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
+from polycorner.tolerances import DEFAULT
 
 SHAPES = ("capsules", "hulls", "parts")
 # How many numbers each attribute has; those after "?" may be missing.
@@ -74,7 +75,7 @@ def read_urdf(
     folder: str | os.PathLike[str] | None = None,
     shapes: Literal["capsules", "hulls", "parts"] = "capsules",
     sides: int | None = None,
-    inertias: Literal["file", "shapes"] = "file",
+    inertias: Literal["file", "nearest", "shapes"] = "file",
     base: Literal["fixed", "floating"] = "fixed",
     options: MeshOptions | None = None,
 ) -> Robot:
@@ -84,7 +85,8 @@ def read_urdf(
     radius about its axis, which reaches a radius beyond its ends, or a prism around it; meshes as
     ``shapes`` says.  Visual shapes, transmissions and plugins are left out.  Links that overlap
     with all joints at zero, or at the limit next to it, are taken not to touch: they are
-    :attr:`Robot.ignored`.  Names become those of Python, with ``_`` for other characters.
+    :attr:`Robot.ignored`.  Limits without numbers are none, as simulators take them.
+    Names become those of Python, with ``_`` for other characters.
 
     Parameters
     ----------
@@ -99,9 +101,11 @@ def read_urdf(
         thousands.
     sides : int, optional
         The sides of prisms around cylinders; by default cylinders become capsules.
-    inertias : {"file", "shapes"}, optional
-        Where centres of mass and inertias are from: the file (default), or the collision shapes
-        filled uniformly, for files with placeholders.  Masses are those of the file.
+    inertias : {"file", "nearest", "shapes"}, optional
+        What becomes of inertias that no body has: they are refused (default), or changed to the
+        nearest ones with second moments of at least a millimetre squared times the mass.  Or all
+        centres of mass and inertias are those of the collision shapes, filled uniformly, where
+        files have placeholders.  Masses are always those of the file.
     base : {"fixed", "floating"}, optional
         Whether the base stands at the origin (default) or moves freely.
     options : MeshOptions, optional
@@ -192,6 +196,11 @@ def _parsed(about: str, data: bytes) -> Any:
         remove_comments=True,
         remove_pis=True,
     )
+    # Files of PyBullet declare the version 0.0, and others begin with an empty line.
+    if declared := re.match(rb"(\xef\xbb\xbf)?\s*<\?xml[^>]*\?>", data):
+        encoding = re.search(rb"encoding\s*=\s*[\"']([\w-]+)", declared[0])
+        if encoding is None or encoding[1].lower() in {b"utf-8", b"ascii", b"us-ascii"}:
+            data = b"\n" * declared[0].count(b"\n") + data[declared.end() :]
     try:
         root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
@@ -308,10 +317,10 @@ def _joint(joint: Any, names: Mapping[str, str]) -> RobotJoint:
             checks.names("link", [role], names)
         matrix, origin = _pose(joint.origin)
         limit, dynamics, mimic = joint.limit, joint.dynamics, joint.mimic
-        limited = joint.type in {"revolute", "prismatic"}
-        lower, upper = (
-            (limit.lower or 0.0, limit.upper or 0.0) if limited else (-math.inf, math.inf)
-        )
+        lower, upper = -math.inf, math.inf
+        given = (limit.lower, limit.upper) if limit is not None else (None, None)
+        if joint.type in {"revolute", "prismatic"} and given != (None, None):
+            lower, upper = (x or 0.0 for x in given)
         if mimic is not None:
             checks.names("mimic", [mimic.joint], names)
             rate = 1.0 if mimic.multiplier is None else mimic.multiplier
@@ -349,10 +358,13 @@ class _Shaper:
             return mass_of(body, inertial.mass / mass_of(body).mass)
         matrix, centre = _pose(inertial.origin)
         inertia = matrix @ inertial.inertia @ matrix.T
+        if self.inertias == "nearest":
+            inertia = nearest_inertia(inertia, inertial.mass)
         try:
             return Mass(inertial.mass, centre, (inertia + inertia.T) / 2)
         except ValueError as error:
-            msg = f"{error} (inertias='shapes' takes those of the collision shapes)"
+            others = "inertias='nearest' takes the nearest ones, 'shapes' those of collision shapes"
+            msg = f"{error} ({others})"
             raise ValueError(msg) from error
 
     def bodies(self, link: Any) -> Iterator[Body]:
@@ -393,6 +405,18 @@ class _Shaper:
         with checks.about(f"mesh {file.name}"):
             found = load_mesh(file, scale, self.options.megabytes)
         if self.shapes == "capsules":
-            return capsule_around(found.vertices)
+            return capsule_around(found.vertices, f"mesh {file.name}")
         parts = "hull" if self.shapes == "hulls" else "convex"
         return convex_body(f"mesh {file.name}", found, parts, self.options)
+
+
+def nearest_inertia(inertia: Array, mass: float) -> Array:
+    """Return the inertia with the nearest second moments that a body may have.
+
+    With ``S``, the integral of ``x x^T``, an inertia is ``tr S - S``; a body has a positive ``S``,
+    here one of at least ``1e-6 m^2`` times the mass.
+    """
+    second = np.trace(inertia) / 2 * np.eye(3) - (inertia + inertia.T) / 2
+    sizes, axes = np.linalg.eigh(second)
+    sizes = np.maximum(sizes, DEFAULT.same * mass)
+    return np.asarray(sizes.sum() * np.eye(3) - (axes * sizes) @ axes.T)

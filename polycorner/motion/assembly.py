@@ -128,7 +128,8 @@ class Assembly(MechanicalSystem):
         lengths = {kind.period for kind in own.values()}
         if len(lengths) > 1:
             refuse("kinds", "positions that repeat after the same lengths", sorted(lengths))
-        return SeveralKinds(own, between, *lengths, next(iter(own.values())).substrate_speed)
+        first = next(iter(own.values()))
+        return SeveralKinds(own, between, first.period, first.substrate_speed)
 
     def _kind(self, name: str) -> IdenticalBodies:
         """Return the bodies of one kind, whose position is that of all pairs that it is in."""

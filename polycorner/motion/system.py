@@ -13,15 +13,15 @@ from polycorner.checks import names, real, reals, refuse, whole
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.kinds import check_fields, checked
-from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
+from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody, PairContacts
 from polycorner.motion.contacts import (
     ContactFamily,
     Friction,
-    FrictionLaw,
     periods_of,
     position_of,
     slip_text,
 )
+from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import (
     Formulation,
     Laws,
@@ -165,12 +165,12 @@ class System(MechanicalSystem, Printed):
             ("substrate", few(f"{name} at {x:g}" for name, x in self.substrate.items())),
             ("exits", few(f"{name} > {x:g}" for name, x in self.exits.items())),
         ]
-        pairs = () if self.between is None or self.count == 1 else self.between.gaps
+        pairs = self.bodies.contacts if self.count > 1 else None
         contacts = listed(
             "Contacts",
             ("contact", "friction", "restitution"),
-            chain(self._contact_rows(), self._pair_rows() if pairs else ()),
-            len(self._normals) + len(pairs),
+            chain(self._contact_rows(), () if pairs is None else _pair_rows(pairs)),
+            len(self._normals) + (0 if pairs is None else len(pairs.gaps.names)),
         )
         return Sheet("System", (facts((what, told) for what, told in about if told), contacts))
 
@@ -181,12 +181,8 @@ class System(MechanicalSystem, Printed):
         bounces = [number(e, 6) for e in self.restitutions.tolist()]
         bounces += ["an equation"] * len(self.polyhedron.equations)
         for name, e in zip(self._normals, bounces, strict=True):
-            yield name, _told(laws.get(name, ())), e
-
-    def _pair_rows(self) -> Iterator[tuple[str, str, str]]:
-        assert self.between is not None
-        for name in self.between.gaps:
-            yield name, _told(self.between.friction), number(self.between.restitution, 6)
+            own = [(f.kind, f.static, f.moving) for f in laws.get(name, ())]
+            yield name, _told(own), e
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kinetic", as_expression("kinetic", self.kinetic))
@@ -501,11 +497,17 @@ def overlapping(scene: Scene | None, called: str, contact: str, i: int) -> str:
     return f"bodies {one!r} and {two!r} overlap"
 
 
-def _told(laws: Sequence[FrictionLaw]) -> str:
+def _pair_rows(contacts: PairContacts) -> Iterator[tuple[str, str, str]]:
+    told = _told([(law.cause, law.static, law.dynamic) for law in contacts.laws])
+    for name in contacts.gaps.names:
+        yield name, told, number(contacts.restitution, 6)
+
+
+def _told(laws: Sequence[tuple[str, ConvexSet, ConvexSet]]) -> str:
     """Return laws of friction in words."""
     return "; ".join(
-        f"{f.kind} {f.static}" + (f", then {f.moving}" if f.moving != f.static else "")
-        for f in laws
+        f"{kind} {sticks}" + (f", then {slides}" if slides != sticks else "")
+        for kind, sticks, slides in laws
     )
 
 

@@ -386,8 +386,8 @@ def _summary(path: Trajectory) -> Iterator[tuple[str, str]]:
     present = path.present[-1]
     at_rest = int((path.rests[-1] & present).sum())
     if bodies.total == 1 < len(path.bodies):  # in one dense system they rest or leave together
-        told = f"all {len(path.bodies)} at rest" if at_rest else "not at rest"
-        yield "at the end", told if present[0] else "none present"
+        at_end = f"all {len(path.bodies)} at rest" if at_rest else "not at rest"
+        yield "at the end", at_end if present[0] else "none present"
     else:
         yield "at the end", f"{int(present.sum())} present, {at_rest} of them at rest"
 

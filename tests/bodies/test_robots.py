@@ -161,7 +161,7 @@ def test_links_are_where_homogeneous_matrices_put_them(seed):
         assert np.allclose(robot.placed(q)[link].markers, points)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(st.integers(0, 10**6))
 def test_dynamics_are_those_of_newton_and_euler(seed):
     robot = tree(seed, 3)
@@ -218,7 +218,7 @@ def check_gaps(robot, seed):
             assert min(f.value(q) for f in gaps) == pytest.approx(away, abs=1e-4)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(st.integers(0, 10**6))
 def test_gaps_are_distances_of_links(seed):
     check_gaps(tree(seed, 3, kinds=("revolute", "prismatic")), seed)
@@ -229,6 +229,7 @@ def test_gaps_of_hulls_are_distances_too():
     check_gaps(robot, 0)
 
 
+@settings(max_examples=3)
 @given(st.integers(0, 10**6))
 def test_gaps_at_walls_are_heights_of_points(seed):
     robot = tree(seed)

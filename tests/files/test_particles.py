@@ -187,7 +187,5 @@ def test_molecules_have_the_radii_of_tables(written):
 def test_columns_by_name_are_points_of_a_manifold():
     table = read_coordinates("t,y,x\n0,1.5,2\n1,2.5,3\n")
     assert table.points(Manifold.euclidean("x y")).tolist() == [[2, 1.5], [3, 2.5]]
-    with pytest.raises(
-        ValueError, match=r"coordinates among \('y', 'x'\), once each; got 'z'"
-    ):
+    with pytest.raises(ValueError, match=r"coordinates among \('y', 'x'\), once each; got 'z'"):
         table.points(Manifold.euclidean("x z"))

@@ -96,6 +96,27 @@ def test_an_arm_is_what_its_file_says(written):
     assert any(re.match(r"hand\.1.*-base_link|base_link.*-hand\.1", name) for name in gaps)
 
 
+def test_declarations_of_other_versions_are_passed_over(written, tmp_path):
+    plain = read_urdf(written())
+    for start in ('<?xml version="0.0" ?>', '\n\n<?xml version="1.0" encoding="utf-8"?>'):
+        text = ARM.replace('<?xml version="1.0"?>', start)
+        assert [*read_urdf(written(text)).links] == [*plain.links]
+        line = text[: text.index('value="2.0"')].count("\n") + 1
+        with pytest.raises(ValueError, match=rf"line {line}: <mass>"):
+            read_urdf(written(text.replace('value="2.0"', 'value="x"')))
+    latin = ARM.replace('"1.0"?>', '"1.0" encoding="iso-8859-1"?>').replace("grey", "gr\u00e9")
+    (tmp_path / "latin.urdf").write_bytes(latin.encode("latin-1"))
+    assert [*read_urdf(tmp_path / "latin.urdf").links] == [*plain.links]
+
+
+def test_limits_without_numbers_are_none(written):
+    limit = '<limit lower="-1.5" upper="2" effort="30" velocity="3"/>'
+    free = read_urdf(written(ARM.replace(limit, '<limit effort="30"/>')))
+    assert (free.joints["elbow"].lower, free.joints["elbow"].upper) == (-math.inf, math.inf)
+    one = read_urdf(written(ARM.replace(limit, '<limit upper="2"/>')))
+    assert (one.joints["elbow"].lower, one.joints["elbow"].upper) == (0, 2)
+
+
 def test_the_home_of_the_arm(written):
     arm = read_urdf(written())
     q = arm.point({"shoulder_1": 0.5, "elbow": 0.3})
@@ -115,10 +136,22 @@ def test_prisms_around_cylinders(written):
 
 def test_inertias_of_shapes(written):
     text = ARM.replace('ixx="0.05"', 'ixx="5"')
-    with pytest.raises(ValueError, match=r"arm\.urdf: link 'upper': inertia.*inertias='shapes'"):
+    with pytest.raises(ValueError, match=r"arm\.urdf: link 'upper': inertia.*inertias='nearest'"):
         read_urdf(written(text))
     mass = read_urdf(written(text), inertias="shapes").links["upper"].mass
     assert (mass.mass, mass.centre.tolist()) == (pytest.approx(2), pytest.approx([0, 0, 0.25]))
+
+
+@pytest.mark.parametrize("moments", [(5, 0.04, 0.03), (0, 0, 0), (-1, 1, 1), (0.05, 0.04, 0.03)])
+def test_nearest_inertias_are_those_of_bodies(written, moments):
+    x, y, z = moments
+    text = ARM.replace('ixx="0.05"', f'ixx="{x}"').replace('iyy="0.04"', f'iyy="{y}"')
+    text = text.replace('izz="0.03"', f'izz="{z}"').replace('ixy="0.001"', 'ixy="0"')
+    found = read_urdf(written(text), inertias="nearest").links["upper"].mass.inertia
+    second = np.array([y + z - x, z + x - y, x + y - z]) / 2
+    nearest = np.maximum(second, 2e-6)  # of a mass of 2
+    expected = nearest.sum() - nearest
+    assert np.linalg.eigvalsh(found) == pytest.approx(sorted(expected), rel=1e-9)
 
 
 def test_links_that_overlap_at_home_are_ignored(written):

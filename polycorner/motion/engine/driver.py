@@ -229,7 +229,8 @@ class Engine:
     def _parameters(self, kind: int) -> Array:
         """Return the parameters of a kind's equations of motion, with the time."""
         first = self.model.force_parameters[kind]
-        return self.model.parameters[first : first + len(self.bodies.kinds[kind].body.parameters)]
+        count = len(self.bodies.kinds[kind].body.parameters)
+        return np.asarray(self.model.parameters[first : first + count])
 
     def _read(self, count: int) -> EventTable:
         whole, numbers = self.log.entries[:count].copy(), self.log.numbers[:count].copy()
@@ -311,7 +312,8 @@ class Engine:
         table = np.zeros((self.model.families, self.model.most_pair_gaps), dtype=np.int64)
         for row, family in zip(table, bodies.families.values(), strict=True):
             row[: len(family.gaps.names)] = [known.index(name) for name in family.gaps.names]
-        return table[self.model.family[bodies.kind_of[i], bodies.kind_of[j]], gaps]
+        families = self.model.family[bodies.kind_of[i], bodies.kind_of[j]]
+        return np.asarray(table[families, gaps])
 
 
 def _own_contacts(bodies: MovingBodies) -> NDArray[np.int64]:

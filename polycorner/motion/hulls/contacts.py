@@ -89,6 +89,11 @@ class HullKernel:
         call(address(q), parameters, address(found), None, None)
         return (found,)
 
+    def over(self, points: Array, parameters: int, _: int = 0) -> tuple[Array]:
+        """Return the values ``(k, m)`` at several points; see :meth:`Kernel.over`."""
+        found = [self.at(q, parameters)[0] for q in points]
+        return (np.array(found).reshape(len(points), self.outputs),)
+
 
 @dataclass(frozen=True, eq=False)
 class HullFamily(Value):
