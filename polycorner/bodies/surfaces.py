@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 from polycorner.bodies.shapes import Part
 from polycorner.spaces.manifold import Array
 
-ARC = 33  # points of a full circle of an outline
+ARC = 65  # points of a full circle of an outline
 BALL = 300  # points of a ball
 RING = 32  # points around a capsule
 

@@ -287,7 +287,7 @@ def _body(system: System) -> dict[str, Any]:
         "kinetic": text(system.kinetic),
         "potential": text(system.potential),
         "forces": {name: text(force) for name, force in system.forces.items()},
-        "gaps": {f.name: [text(f.expression), *f.parameters] for f in polyhedron.functions},
+        "gaps": {f.name: _gap(f) for f in polyhedron.functions},
         "equations": {h.name: [text(h.expression), *h.parameters] for h in polyhedron.stated},
     }
     if system.hulls:
@@ -314,6 +314,16 @@ def _between(family: ContactFamily | HullContacts | None) -> dict[str, Any] | No
     }
 
 
+def _gap(function: SmoothFunction) -> list[Any]:
+    """Return a gap as text, or as a digest where its formula is written in steps, as of bodies.
+
+    Written out at once it can be too long for any file.
+    """
+    if _in_steps(function.family):
+        return [*_slip(function)]
+    return [formula_text(function.expression), *function.parameters]
+
+
 def _slip(component: Any) -> Any:
     """Return a component of a slip as text; a function that is shared as a digest and numbers."""
     if not isinstance(component, SmoothFunction):
@@ -324,6 +334,11 @@ def _slip(component: Any) -> Any:
         *component.reads,
         *component.parameters,
     ]
+
+
+@lru_cache(maxsize=64)
+def _in_steps(family: Family) -> bool:
+    return bool(family.formulas()[0])
 
 
 @lru_cache(maxsize=64)

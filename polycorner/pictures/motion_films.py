@@ -70,7 +70,7 @@ class MotionFilm(Checked):
         return motion_page(self.poses, title=self.title, speed=self.speed, contacts=self.contacts)
 
     def _repr_html_(self) -> str:
-        frame = 'width="100%" height="640" style="border: 0" sandbox="allow-scripts"'
+        frame = 'width="100%" height="720" style="border: 0" sandbox="allow-scripts"'
         return f'<iframe {frame} srcdoc="{escape(self.page)}"></iframe>'
 
     def show(self) -> Path:

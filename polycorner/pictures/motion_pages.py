@@ -13,7 +13,6 @@ from polycorner.bodies.walls import HalfSpace, Wall
 from polycorner.pictures.arrangements import (
     FIXED,
     OUTLINE,
-    OUTSIDE,
     circle_of,
     colours_of,
     turns,
@@ -167,7 +166,8 @@ def _band(centre: Array, radius: float) -> Triangles:
 def _layer(triangles: Triangles, colour: str) -> dict[str, Any]:
     vertices, faces, normals = triangles
     return {
-        "colour": to_hex(colour),
+        # One of the style sheet, which has a light and a dark one, or one of its own.
+        "colour": colour if colour.startswith("--") else to_hex(colour),
         "vertices": packed(np.asarray(vertices, "<f4")),
         "faces": packed(np.asarray(faces, "<u4")),
         "normals": packed(np.asarray(normals, "<f4")),
@@ -180,7 +180,7 @@ def _still(poses: Poses, window: Array, unit: float) -> list[dict[str, Any]]:
     found = []
     if arrangement.dimension == 2:
         areas = [_outside(wall, window, -4 * LIFT * unit) for wall in arrangement.walls.values()]
-        found += [{"layers": [_layer(area, OUTSIDE)]} for area in areas]
+        found += [{"layers": [_layer(area, "--line")]} for area in areas]
     for body in arrangement.fixed.values():
         copies = arrangement.lattice.copies(body, *window) if arrangement.dimension == 2 else [body]
         found += [{"layers": _layers(copy, FIXED, unit, marked=False)} for copy in copies]

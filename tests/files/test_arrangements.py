@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray
 
 from polycorner import simulate
 from polycorner.bodies import (
@@ -108,3 +109,19 @@ def test_motions_without_bodies_and_of_others_are_refused(tmp_path):
         saved_poses(file)
     with pytest.raises(ValueError, match="arrangement: expected one of the coordinates xA, yA"):
         save_trajectory(path, tmp_path / "b.nc", arrangement=CASES["plane"])
+
+
+def test_gaps_of_bodies_are_told_by_digests(tmp_path):
+    """Their formulas, written out at once, are too long; those of a user's own are kept as text."""
+    square = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]], 0.1)
+    a = Arrangement({"S": square, "D": disc(0.5)}, box([-4, 0], [4, 8]), orientations="all")
+    system = a.system()
+    start = system.state(a.point({"S": ([-2, 2], 0.1), "D": ([2, 2], 0.0)}))
+    file = save_trajectory(simulate(system, start, 0.02, 0.01), tmp_path / "a.nc", arrangement=a)
+    with xarray.open_dataset(file, engine="h5netcdf") as data:
+        told = json.loads(data.attrs["system"])["gaps"]
+    assert max(len(entry[0]) for entry in told.values()) < 100
+    assert len(load_trajectory(file, system)) == 3
+    other = Arrangement({"S": square, "D": disc(0.6)}, box([-4, 0], [4, 8]), orientations="all")
+    with pytest.raises(ValueError, match="is of another system"):
+        load_trajectory(file, other.system())

@@ -161,7 +161,7 @@ class Stage {
   // Prepare a film of motion_pages.py: kinds with triangles, what stands still, and outlines.
   async build(film) {
     this.flat = film.flat;
-    for (const [k, kind] of film.kinds.entries()) kind.meshes = await this.meshes(kind);
+    for (const kind of film.kinds) kind.meshes = await this.meshes(kind);
     for (const [k, thing] of film.still.entries()) {
       for (const mesh of await this.meshes({ ...thing, most: 1 })) this.put(`still ${k} ${mesh.name}`, mesh);
     }
@@ -183,7 +183,8 @@ class Stage {
       geometry.setAttribute("position", new THREE.BufferAttribute(await floats(vertices), 3));
       geometry.setAttribute("normal", new THREE.BufferAttribute(await floats(normals), 3));
       geometry.setIndex(new THREE.BufferAttribute(await counts(faces), 1));
-      const paint = { color: new THREE.Color(colour).convertSRGBToLinear() };
+      const named = colour.startsWith("--") ? this.style(colour.slice(2)) : colour;
+      const paint = { color: new THREE.Color(named).convertSRGBToLinear() };
       const material = this.flat ? new THREE.MeshBasicMaterial({ ...paint, side: THREE.DoubleSide })
         : new THREE.MeshStandardMaterial({ ...paint, roughness: 0.5, metalness: 0 });
       const mesh = new THREE.InstancedMesh(geometry, material, most);
