@@ -24,7 +24,7 @@ from polycorner.motion.formulation import moment
 
 G = 10.0
 SQUARE = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]], 0.1)
-CUBE = [[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+SIMPLEX = [[-1, -1, -1], [1.5, 0, 0], [0, 1.5, 0], [0, 0, 1.5]]
 RNG = np.random.default_rng(5)
 
 
@@ -45,7 +45,7 @@ def in_plane():
 def in_space():
     pipe = Cylinder(9.0, axis=[1, 2, 2], point=[0, 1, 0])
     return Arrangement(
-        {"A": polytope(CUBE, 0.2), "B": capsule([-1, 0, 0], [1, 0, 1], 0.3), "C": sphere(0.6)},
+        {"A": polytope(SIMPLEX, 0.2), "B": capsule([-1, 0, 0], [1, 0, 1], 0.3), "C": sphere(0.6)},
         {
             "floor": HalfSpace([0, 0.3, 1], [0, 0, -8]),
             "pipe": pipe,
@@ -326,6 +326,29 @@ def test_records_do_not_depend_on_how_often_they_are_made():
             (r.contact, r.normal, dict(r.friction)) for r in other
         ]
     assert all(a <= b for a, b in pairwise(often.friction.whole[:, 0].tolist()))
+
+
+def test_files_keep_friction_and_old_ones_load_without(tmp_path):
+    import xarray as xr
+
+    from polycorner.files import load_trajectory, save_trajectory
+    from polycorner.files.trajectories import _read, trajectory_dataset
+
+    a = Arrangement({"D": disc(1.0)}, {"floor": HalfSpace([0, 1], [0, 0])}, orientations="all")
+    system = a.system(gravity=[1.0, -G], friction=0.5, rolling=0.01, count=2)
+    start = system.state([[0, 1, 0], [2, 1, 0]])
+    path = simulate(system, start, 0.05, 1e-3, every=10)
+    again = load_trajectory(save_trajectory(path, tmp_path / "path.nc"), system)
+    for index in range(len(path)):
+        one, other = (contact_forces(some, index) for some in (path, again))
+        assert one.between == other.between
+        np.testing.assert_array_equal(one.forces, other.forces)
+        np.testing.assert_array_equal(one.torques, other.torques)
+    content = trajectory_dataset(path)
+    assert isinstance(content, xr.Dataset)
+    old = _read(content.drop_vars([n for n in content if n.startswith("rub_")]), system)
+    assert old.touching == path.touching
+    assert not any(row.friction for row in old.contacts(-1))
 
 
 def test_systems_without_a_scene_have_no_places(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from polycorner import minimise
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.statics.keel import Keel, exact_eastern_boundary
 from polycorner.motion.events import EventKind
@@ -145,3 +146,12 @@ def test_energy_is_accounted_for_better_with_shorter_steps():
         assert path.work["substrate"][-1] > 0
         errors.append(path.audit)
     assert 0 < errors[1] < errors[0] / 4 < 1e-3
+
+
+def test_a_nested_pair_touches_at_the_first_instant():
+    drum = DumbbellDrum(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125, count=2)
+    pair = drum.pair
+    nested = minimise(pair.polyhedron, pair.energy, pair.nested("R", clearance=0.1))
+    path = simulate(drum, drum.state(nested.point.reshape(2, 3)), 0.01, 1e-3)
+    assert {name for _, name, _ in path.touching[0]} == {*nested.active}
+    assert all(force > 0 for _, _, force in path.touching[0])

@@ -67,6 +67,9 @@ def same_motion(one, other):
     """Check that two trajectories agree bit for bit in all that is recorded."""
     for name in ("times", "q", "v", "rests", "present", "kinetic", "potential"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), strict=True)
+    for name in ("whole", "forces"):
+        left, right = (getattr(some.friction, name) for some in (one, other))
+        np.testing.assert_array_equal(left, right, strict=True)
     for name in ("dissipated", "work"):
         left, right = getattr(one, name), getattr(other, name)
         assert list(left) == list(right)
