@@ -40,6 +40,7 @@ from examples import (
     ex29_cages,
     ex30_clusters_of_atoms,
     ex31_landscape,
+    ex32_silo,
     ex34_two_link_arm,
     ex35_slider_crank,
 )
@@ -415,3 +416,14 @@ def test_slider_crank():
     assert result.error < 1e-5
     assert result.path.audit < 1e-5
     assert np.ptp(result.piston) == pytest.approx(2 * ex35_slider_crank.CRANK, rel=1e-4)
+
+
+def test_rough_walls_of_a_silo_bear_a_part_of_the_weight(tmp_path):
+    found = ex32_silo.main()
+    smooth, rough = (found.floor[name][-20:].mean() for name in ("smooth", "rough"))
+    assert smooth == pytest.approx(1.0, abs=0.02)
+    assert abs(rough - 1.0) > 0.02  # how much depends on how they came to lie
+    for path in (found.smooth, found.rough):
+        assert path.audit < 1e-3
+        assert path.max_penetration < 0.02
+    assert ex32_silo.draw(found, tmp_path / "silo.png").stat().st_size > 10_000

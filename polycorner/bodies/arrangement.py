@@ -38,7 +38,6 @@ from polycorner.bodies.shapes import Body
 from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.motion.assembly import Assembly
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
@@ -324,7 +323,7 @@ class Arrangement(Checked, Printed):
         count: int | Mapping[str, int] = 1,
         drives: Mapping[str, Drive] | None = None,
         forces: Mapping[str, Sequence[Any]] | None = None,
-    ) -> System | Assembly:
+    ) -> System | Any:
         """Return the mechanical system of the bodies.
 
         Several bodies are one dense system, with states ``(N,)``.  A single one may be repeated:
@@ -369,6 +368,11 @@ class Arrangement(Checked, Printed):
         -----
         By the name of a joint ``friction`` is a bound of the force or torque with which it resists
         its motion (or a static and a dynamic one), and ``restitution`` that of its limits.
+
+        Returns
+        -------
+        System
+            Where ``count`` has names, an :class:`~polycorner.motion.Assembly`.
 
         Raises
         ------

@@ -24,7 +24,7 @@ from polycorner.values import cached_property
 Pair = tuple[str, str]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Assembly(MechanicalSystem):
     """Many bodies of several kinds with unilateral contacts and friction.
 
@@ -114,6 +114,10 @@ class Assembly(MechanicalSystem):
             names("position", family.position, either)
             found[pair] = family
         object.__setattr__(self, "between", found)
+
+    def __repr__(self) -> str:
+        """Return how many bodies of which kinds there are."""
+        return f"Assembly({', '.join(f'{n} {name}' for name, n in self.count.items())})"
 
     @cached_property
     def bodies(self) -> SeveralKinds:

@@ -20,7 +20,7 @@ from polycorner.motion.scenes import ContactForce, ContactForces, FrictionTable
 from polycorner.motion.system import System
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled
 from polycorner.spaces.manifold import Array
-from polycorner.values import Checked, Value
+from polycorner.values import Checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ Touch = tuple[tuple[int, ...], str, float]
 
 
 @dataclass(frozen=True, eq=False)
-class MotionOfKind(Value):
+class MotionOfKind(Checked):
     """The motion of the bodies of one kind among several.
 
     Attributes

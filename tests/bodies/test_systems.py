@@ -318,7 +318,7 @@ def masses(mass, centre, inertia):
         (system(UPRIGHT, masses={"2": TURNED}), ValueError, "masses: .* '2' that looks the same"),
         (on_the_ground(friction=-1, count=2), ValueError, "friction"),
         (on_the_ground(count=0), ValueError, "count"),
-        (system(count=2), ValueError, "count: expected 1 for several bodies"),
+        (system(count=2), ValueError, "count: expected 1, or numbers by name"),
         (masses(0, [0, 0], 1), ValueError, "mass"),
         (masses(1, [0, 0], 0), ValueError, "inertia"),
         (masses(1, [0, 0, 0], [1, 1, 2.1]), ValueError, "inertia"),

@@ -167,6 +167,7 @@ def test_bodies_have_the_names_of_their_kinds(mixture):
     for bodies, contact, _ in path.touching[-1]:
         kinds = [path.bodies[i].split()[0] for i in bodies]
         assert all(kind in contact for kind in kinds)
+    assert repr(system) == "Assembly(4 rod, 6 large, 12 small)"
     text = str(path)
     assert "4 rod, with 3 coordinates each; 6 large" in text
     with pytest.raises(ValueError, match="kind: expected names among rod, large, small; got tiny"):

@@ -78,6 +78,7 @@ class Model(NamedTuple):
     """
 
     bodies: Annotated[Any, whole()]  # N
+    kinds: Annotated[Any, whole()]  # A
     kind: Annotated[Any, whole("N")]  # of each body
     dimension: Annotated[Any, whole()]  # k: coordinates of a body; bodies with fewer have zeros
     lanes: Annotated[Any, whole()]  # K: coordinates of a body, and zeros up to whole vectors

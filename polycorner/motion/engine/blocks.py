@@ -25,7 +25,7 @@ from polycorner.motion.engine.evaluation import (
     evaluate_gaps,
     evaluate_pair_gaps,
 )
-from polycorner.motion.engine.families import family_of, pair_inputs
+from polycorner.motion.engine.families import coordinates_of, family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rows import (
@@ -273,7 +273,7 @@ def add_friction(model, state, work, contact, pressing):
     # One kernel serves both orders of two bodies, so that a pair has the same bits whichever comes
     # first.
     first, second = (j, i) if model.pair_slips[slip, 1] else (i, j)
-    one, two = model.coordinates[model.kind[first]], model.coordinates[model.kind[second]]
+    one, two = coordinates_of(model, first), coordinates_of(model, second)
     for a in range(reads):
         read = model.first_read[family] + a
         which = first if model.pair_reads[read, 0] == 0 else second

@@ -9,6 +9,7 @@ one compact contact; any other block is one alone.
 import numpy as np
 
 from polycorner.motion.engine.arrays import WATCHED
+from polycorner.motion.engine.families import coordinates_of, kind_of
 from polycorner.motion.engine.gauss_seidel import EXACT
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.linear_algebra import factorise
@@ -44,12 +45,12 @@ def begin_compact(model, state, mid, crowd, i):
     k, K, root, at = model.dimension, model.lanes, crowd.mass_root[i], state.rank[i]
     for c in range(K):
         crowd.unit_velocity[at, c] = crowd.unit_shift[at, c] = 0.0
-    if model.constant_mass[model.kind[i]] and root[0, 0] > 0.0:
+    if model.constant_mass[kind_of(model, i)] and root[0, 0] > 0.0:
         return
     for a in range(k):
         for c in range(k):
             root[a, c] = mid.inverse_mass[i, a, c] if c <= a else 0.0
-    if not factorise(root, model.coordinates[model.kind[i]]):
+    if not factorise(root, coordinates_of(model, i)):
         # The body and all that touches it become not a number, which stops the run with a reason.
         root[0, 0] = np.nan
 

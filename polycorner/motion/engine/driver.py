@@ -32,7 +32,7 @@ from polycorner.motion.engine.arrays import (
     Log,
     declarations,
 )
-from polycorner.motion.engine.intermediate import compiled_advance
+from polycorner.motion.engine.intermediate import ANY, compiled_advance
 from polycorner.motion.engine.layout import model_of
 from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.engine.threads import assisted
@@ -166,7 +166,7 @@ class Engine:
     def advance(self, steps: int) -> EventTable:
         """Advance by so many steps and return the events in them."""
         # Compiles the engine, unless the cache has it.
-        advance = compiled_advance(self.bodies.width)
+        advance = compiled_advance(self.bodies.width if len(self.bodies.kinds) == 1 else ANY)
         events: list[EventTable] = []
         while steps > 0:
             first, *others = self._addresses

@@ -37,11 +37,13 @@ def readers(dimension: int) -> list[Any]:
     """Return the functions that make model, state, work and log of the addresses of their tables.
 
     The table of the work has the addresses of those of its parts.  ``dimension`` is the number of
-    coordinates of a body, or 0 for any.
+    coordinates of a body of the only kind, or 0 for any bodies.
     """
     lanes = -(-dimension // WIDTH) * WIDTH
     lengths = {"k": dimension, "2*k": 2 * dimension, "K": lanes, "2*K": 2 * lanes}
-    known = {**lengths, "dimension": dimension, "lanes": lanes} if dimension else {}
+    # Code for any number of coordinates is also that for bodies of several kinds.
+    one = {"dimension": dimension, "lanes": lanes, "kinds": 1}
+    known = lengths | one if dimension else {}
 
     def read(record: Any) -> Any:
         name = f"{record.__name__}, {dimension}"
@@ -120,8 +122,8 @@ def advance(model, state, work, log, steps):
 def made(dimension: int) -> str:
     """Return the engine as intermediate code.
 
-    It is for bodies of ``dimension`` coordinates, or of any number if that is 0.  Called for less
-    than zero steps, it assists the thread that advances.
+    It is for bodies of one kind with ``dimension`` coordinates, or for any if that is 0.  Called
+    for less than zero steps, it assists the thread that advances.
     """
     model_at, state_at, work_at, log_at = readers(dimension)
 

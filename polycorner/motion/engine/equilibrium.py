@@ -6,6 +6,7 @@ First it is asked which contacts can carry at the velocities of rest, and where 
 import numpy as np
 
 from polycorner.motion.engine.arrays import NEWTON_STEPS
+from polycorner.motion.engine.families import kind_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses
 from polycorner.motion.engine.island_matrix import (
     add_block,
@@ -96,7 +97,7 @@ def imbalance(model, mid, velocity, block, matrix, first, last, n):
             value = 0.0
             for a in range(k):
                 value += mid.inverse_mass[i, c, a] * x[at * K + a]
-            far = max(far, abs(value) * model.units[model.kind[i], c])
+            far = max(far, abs(value) * model.units[kind_of(model, i), c])
     return far
 
 

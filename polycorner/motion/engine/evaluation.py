@@ -4,7 +4,7 @@ import numpy as np
 
 from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import CHANGED, SETTLED
-from polycorner.motion.engine.families import family_of, pair_inputs
+from polycorner.motion.engine.families import coordinates_of, family_of, kind_of, pair_inputs
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
 
@@ -61,8 +61,8 @@ def evaluate_forces(model, mid, scratch, i, v, h, mass):
 
     Return where its loads are in values.
     """
-    kind, values = model.kind[i], scratch.values
-    k = model.coordinates[kind]
+    kind, values = kind_of(model, i), scratch.values
+    k = coordinates_of(model, i)
     for c in range(k):
         values[c] = mid.q[i, c]
         values[k + c] = v[i, c]
@@ -91,15 +91,15 @@ def random_impulse(model, i, c, h, time, index):
     if model.kick_time > 0.0:
         begin, end = time - 0.5 * h, time + 0.5 * h
         drawn = held_integral(model.seed, model.kick_time, begin, end, i, KICK + c)
-        return model.kicks[model.kind[i], c] / np.sqrt(model.kick_time) * drawn
+        return model.kicks[kind_of(model, i), c] / np.sqrt(model.kick_time) * drawn
     draw = gaussian(model.seed, index, i, KICK + c) * (h / model.step)
-    return model.kicks[model.kind[i], c] * np.sqrt(model.step) * draw
+    return model.kicks[kind_of(model, i), c] * np.sqrt(model.step) * draw
 
 
 @compiled
 def evaluate_body(model, state, mid, scratch, i, h, time, index):
     """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
-    k, kind, values = model.dimension, model.kind[i], scratch.values
+    k, kind, values = model.dimension, kind_of(model, i), scratch.values
     for c in range(k):
         mid.q[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         mid.kick[i, c] = 0.0
@@ -131,7 +131,7 @@ def evaluate_slips(model, state, mid, scratch, i):
     """Evaluate the slips of a body at the midpoint: derivatives by velocities, and what is left."""
     k, values = model.dimension, scratch.values
     start, base = values.ctypes.data, model.parameters.ctypes.data
-    kind, first = model.kind[i], model.slip_start[model.first_friction[i]]
+    kind, first = kind_of(model, i), model.slip_start[model.first_friction[i]]
     for call in range(model.first_slip_call[kind], model.first_slip_call[kind + 1]):
         address, n, m = (
             model.slip_calls[call, 0],
@@ -173,8 +173,8 @@ def approach_equations(model, mid, scratch, i):
     Gauss and Newton's, of least length in scaled coordinates; equations may be redundant.
     """
     never_inline()
-    kind, A, x = model.kind[i], scratch.matrix, scratch.vector
-    k, units = model.coordinates[kind], model.units[kind]
+    kind, A, x = kind_of(model, i), scratch.matrix, scratch.vector
+    k, units = coordinates_of(model, i), model.units[kind]
     for _ in range(MOST_APPROACHES):
         evaluate_gaps(model, scratch, i, mid.q, mid.gap, mid.gradient)
         worst = 0.0
@@ -232,7 +232,7 @@ def update_forces(model, state, work, h):
             for a in range(k):
                 difference = mid.force[i, a] - body.former_force[i, a]
                 value += mid.inverse_mass[i, c, a] * difference
-            unit = model.units[model.kind[i], c]
+            unit = model.units[kind_of(model, i), c]
             change = max(change, abs(value) * unit)
             speed += (abs(velocity.new[i, c]) + abs(state.v[i, c])) * unit
         # As a change of velocity, not of force: what it means depends on the mass.
@@ -248,7 +248,7 @@ def evaluate_gaps(model, scratch, i, q, gap, gradient):
     """Evaluate the gaps between a body and its surroundings, and their gradients."""
     values = scratch.values
     start, base = values.ctypes.data, model.parameters.ctypes.data
-    kind, first = model.kind[i], model.first_gap[i]
+    kind, first = kind_of(model, i), model.first_gap[i]
     for call in range(model.first_gap_call[kind], model.first_gap_call[kind + 1]):
         address, n, m = model.gap_calls[call, 0], model.gap_calls[call, 1], model.gap_calls[call, 2]
         r0, w0, p0 = model.gap_calls[call, 3], model.gap_calls[call, 4], model.gap_calls[call, 5]
@@ -304,7 +304,7 @@ def start_body(model, state, work, i):
     mid, velocity, body, island = work.mid, work.velocity, work.body, work.island
     if not state.alive[i] or island.stage[island.parent[i]] == SETTLED:
         return
-    k, kind, finite, speed = model.dimension, model.kind[i], True, 0.0
+    k, kind, finite, speed = model.dimension, kind_of(model, i), True, 0.0
     for c in range(k):
         value = state.v[i, c]
         if body.awake[i]:

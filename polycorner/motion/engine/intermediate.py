@@ -1,7 +1,7 @@
 """The compiled engine.
 
-There is code for bodies of any number of coordinates, and faster code for the commonest numbers, by
-a sixth for dumbbells; results are the same, bit for bit.
+There is code for bodies of any number of coordinates, and of several kinds, and faster code for the
+commonest numbers and one kind, by a sixth for dumbbells; results are the same, bit for bit.
 
 ``python -m polycorner.motion.engine.intermediate`` writes the package's files; ``make
 intermediate`` does this after any stage was changed.

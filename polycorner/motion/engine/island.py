@@ -14,6 +14,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
+from polycorner.motion.engine.families import coordinates_of, kind_of
 from polycorner.motion.engine.gauss_seidel import relax_block, residual
 from polycorner.motion.engine.island_matrix import number_bodies
 from polycorner.motion.engine.jit import ONE, compiled
@@ -273,7 +274,7 @@ def rests(model, state, work, first, last, speed):
             if not find_rest_velocity(model, mid, scratch, state.normal, i, rest):
                 return False
             for c in range(k):
-                far = abs(velocity.new[i, c] - rest[c]) * model.units[model.kind[i], c]
+                far = abs(velocity.new[i, c] - rest[c]) * model.units[kind_of(model, i), c]
                 # A body that was not at rest may be stopped only where it hardly moves: rest must
                 # not swallow a motion.
                 if not state.rests[i] and far > SLOW * speed:
@@ -325,7 +326,7 @@ def find_grip_velocity(model, velocity, block, scratch, first, last, i):
 
     It is that of least squares; :func:`find_equilibrium` checks that nothing slips at it.
     """
-    k, A, x = model.coordinates[model.kind[i]], scratch.matrix, scratch.rest_velocity
+    k, A, x = coordinates_of(model, i), scratch.matrix, scratch.rest_velocity
     for c in range(k):
         x[c] = 0.0
         for a in range(k):

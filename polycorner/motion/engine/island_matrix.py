@@ -7,6 +7,7 @@ diagonal; then, in the same order, those below.
 """
 
 from polycorner.formulas.compilation import never_inline
+from polycorner.motion.engine.families import coordinates_of
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.ordering import eliminate_all, find_neighbours, list_bodies
 from polycorner.motion.engine.rows import add_rows, row_at, row_times
@@ -197,7 +198,7 @@ def assemble_mass(model, mid, matrix, n, weight):
         store(A, at, zeros())
     for p in range(n):
         i = matrix.members[p]
-        own = model.coordinates[model.kind[i]]
+        own = coordinates_of(model, i)
         for x in range(K):
             line = (p * K + x) * K
             # Unused lanes have equations of their own, 1 x = 0: the elimination needs no exception

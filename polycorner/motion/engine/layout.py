@@ -52,6 +52,7 @@ def model_of(
         kicks[a, : kind.dimension] = [noise.kicks.get(name, 0.0) for name in names]
     values = {
         "bodies": sizes.N,
+        "kinds": sizes.A,
         "kind": bodies.kind_of,
         "dimension": sizes.k,
         "lanes": sizes.K,

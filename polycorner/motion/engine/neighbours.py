@@ -5,7 +5,7 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import CONTACTS
 from polycorner.motion.engine.evaluation import evaluate_pair
-from polycorner.motion.engine.families import family_of, pair_inputs
+from polycorner.motion.engine.families import family_of, kind_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 
 
@@ -15,10 +15,10 @@ def position_of(model, state, i, a, time):
 
     It is zero where there is none.
     """
-    c = model.position[model.kind[i], a]
+    c = model.position[kind_of(model, i), a]
     if c < 0:
         return 0.0
-    x = state.q[i, c] * model.units[model.kind[i], c]
+    x = state.q[i, c] * model.units[kind_of(model, i), c]
     return x - model.substrate_speed * time if a == 0 else x
 
 
@@ -184,7 +184,7 @@ def detect_pair(model, state, mid, neighbours, pair, scratch, slot, limit, share
 @compiled
 def speed_of(model, v, i):
     """Return a bound of the speed of a body's points, relative to the moving substrate."""
-    kind, speed = model.kind[i], 0.0
+    kind, speed = kind_of(model, i), 0.0
     for c in range(model.dimension):
         carried = model.substrate_speed if c == model.substrate_coordinate[kind] else 0.0
         speed += abs(v[i, c] * model.units[kind, c] - carried)
@@ -212,8 +212,8 @@ def detection_distance(model, body, h):
 @compiled
 def component(model, of, i, d):
     """Return a component of a body's position or velocity, as a length; zero if there is none."""
-    c = model.position[model.kind[i], d]
-    return of[i, c] * model.units[model.kind[i], c] if c >= 0 else 0.0
+    c = model.position[kind_of(model, i), d]
+    return of[i, c] * model.units[kind_of(model, i), c] if c >= 0 else 0.0
 
 
 @compiled

@@ -182,7 +182,7 @@ def count_residuals(model, state, work, log, time, count):
 def set_time(model, time):
     """Tell the formulas the time, and what depends on nothing else."""
     base = model.parameters.ctypes.data
-    for kind in range(model.kind[model.bodies - 1] + 1):
+    for kind in range(model.kinds):
         at, signals = model.time_parameter[kind], model.signal_kernel[kind]
         if at >= 0:
             model.parameters[at] = model.start + time

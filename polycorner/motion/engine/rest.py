@@ -1,5 +1,6 @@
 """Rest of a single body: its velocity, and the impulses that prove it."""
 
+from polycorner.motion.engine.families import coordinates_of, kind_of
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, solve_spd
 from polycorner.motion.engine.sets import contains
@@ -47,7 +48,7 @@ def compliance(model, mid, lam, i, g):
 @compiled
 def find_rest_velocity(model, mid, scratch, lam, i, out):
     """Find the velocity at which no loaded contact slips or opens; return whether there is one."""
-    k, A = model.coordinates[model.kind[i]], scratch.matrix
+    k, A = coordinates_of(model, i), scratch.matrix
     for c in range(k):
         out[c] = 0.0
         for a in range(k):
@@ -63,7 +64,7 @@ def find_rest_velocity(model, mid, scratch, lam, i, out):
                     out[c] -= mid.slip_offset[r] * mid.slip_rows[r, c]
     if not solve_spd(A, out, k):
         return False
-    top, units = 0.0, model.units[model.kind[i]]
+    top, units = 0.0, model.units[kind_of(model, i)]
     for c in range(k):
         top = max(top, abs(out[c]) * units[c])
     for c in range(k):
@@ -123,7 +124,7 @@ def balances(model, state, mid, sleep, scratch, i, others, again, slack):
     sets, up to a relative slack, it proves that the body remains at rest.  It is left in
     ``sleep.proof_friction`` and ``sleep.proof_normal``.
     """
-    k, A, r = model.coordinates[model.kind[i]], scratch.matrix, scratch.vector
+    k, A, r = coordinates_of(model, i), scratch.matrix, scratch.vector
     first_gap, last_gap = model.first_gap[i], model.first_gap[i + 1]
     first, last = model.first_friction[i], model.first_friction[i + 1]
     lam, friction = sleep.proof_normal, sleep.proof_friction
@@ -194,7 +195,7 @@ def comes_to_rest(model, state, work, i, rest):
         return False
     size, far, old = work.body.island_speed[i], 0.0, 0.0
     for c in range(k):
-        unit = model.units[model.kind[i], c]
+        unit = model.units[kind_of(model, i), c]
         size = max(size, abs(rest[c]) * unit)
         far = max(far, abs(velocity.new[i, c] - rest[c]) * unit)
         old = max(old, abs(state.v[i, c] - rest[c]) * unit)

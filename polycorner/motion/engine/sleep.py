@@ -10,6 +10,7 @@ from polycorner.motion.engine.arrays import (
     SUBSTRATE_WORK,
 )
 from polycorner.motion.engine.evaluation import evaluate_body
+from polycorner.motion.engine.families import kind_of
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.neighbours import bodies_of
 from polycorner.motion.engine.partition import island_of, root_of
@@ -139,7 +140,7 @@ def next_check(model, state, mid, sleep, i, h, index):
         steps = np.int64(0.1 * SLEEP_MARGIN / rate)
     for c in range(model.dimension):
         # Forces that are drawn anew in each step have no rate.
-        if model.kicks[model.kind[i], c] > 0.0:
+        if model.kicks[kind_of(model, i), c] > 0.0:
             return index + 1
     for g in range(model.first_gap[i], model.first_gap[i + 1]):
         # Impulses of contacts depend on each other; only known loads change slowly by themselves.

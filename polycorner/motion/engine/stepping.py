@@ -35,6 +35,7 @@ from polycorner.motion.engine.contact_list import EXIT, MOTION, REST, record, re
 from polycorner.motion.engine.crowds import is_crowd, renew_ranks
 from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
+from polycorner.motion.engine.families import kind_of
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbour_list import list_neighbours, outdated
 from polycorner.motion.engine.neighbours import bodies_of
@@ -185,7 +186,10 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
             state.q[i, c] = work.mid.q[i, c] + 0.5 * h * state.v[i, c]
             if model.crowd_sweeps > 0 and body.awake[i]:
                 state.q[i, c] += work.crowd.shift[i, c]
-        leaving, limit = model.exit_coordinate[model.kind[i]], model.exit_limit[model.kind[i]]
+        leaving, limit = (
+            model.exit_coordinate[kind_of(model, i)],
+            model.exit_limit[kind_of(model, i)],
+        )
         if leaving >= 0 and state.q[i, leaving] > limit:
             state.alive[i] = 0
             count = record(log, count, EXIT, i, NONE, NONE, time + h, 0.0)
