@@ -90,11 +90,11 @@ def first(dimension: int, count: int) -> None:
     simulate(system, start, 10 * dt, dt)
 
 
-def throw(throws: int, at_once: int = 6) -> tuple[list[int], int]:
+def throw(throws: int, first: int = 0, at_once: int = 6) -> tuple[list[int], int]:
     """Return how often each face came up, and how many dice did not lie flat."""
     a, system = tray(3, 3.5, friction=0.3, restitution=0.3, count=at_once)
     counts, cocked = [0] * FACES, 0
-    for seed in range(throws):
+    for seed in range(first, first + throws):
         rng = np.random.default_rng(seed)
         q = loosely(a, at_once, 3.5, rng)
         speeds = [a.velocity(x, {"A": (rng.normal(size=3), 4 * rng.normal(size=3))}) for x in q]
@@ -113,12 +113,14 @@ def main() -> None:
     """Print all tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--dice", type=int, default=100, help="throws of six dice")
+    parser.add_argument("--seed", type=int, default=0, help="of the first throw")
+    parser.add_argument("--paces", type=int, default=len(SCENES), help="how many scenes are timed")
     parser.add_argument("--first", nargs=2, type=int, help="dimension and count: ten steps only")
     given = parser.parse_args()
     if given.first:
         first(*given.first)
         return
-    for name, (dimension, count) in SCENES.items():
+    for name, (dimension, count) in list(SCENES.items())[: given.paces]:
         pace(dimension, count)
         with tempfile.TemporaryDirectory() as folder:
             cache = os.environ | {"POLYCORNER_CACHE_DIR": folder}
@@ -127,7 +129,7 @@ def main() -> None:
             subprocess.run(command, env=cache, check=True)
             print(f"{name}: first ten steps after {time.perf_counter() - began:.1f} s", flush=True)
     if given.dice:
-        counts, cocked = throw(given.dice)
+        counts, cocked = throw(given.dice, given.seed)
         p = chisquare(counts).pvalue
         print(f"faces {counts}, not flat {cocked}: chance of more difference {p:.2f}")
 

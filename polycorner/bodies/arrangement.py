@@ -21,7 +21,7 @@ from polycorner.bodies.dynamics import (
     listed_hulls,
     masses_of,
     rubbing_hulls,
-    twins,
+    touching_twins,
 )
 from polycorner.bodies.joints import WORLD, AnyJoint
 from polycorner.bodies.kernels import together
@@ -446,7 +446,7 @@ class Arrangement(Checked, Printed):
                 tuple(self.at_walls),
                 frozenset(self.walls),
                 count,
-                partial(twins, (first, first), self.lattice),
+                partial(touching_twins, (first, first), self.lattice),
                 {n: (a.body, b.body) for one, (a, b) in hulls for n in one.names},
             ),
         )

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +15,8 @@ from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.laws import Both, Laws
 from polycorner.bodies.masses import Mass, mass_of
-from polycorner.bodies.neighbours import pairs
-from polycorner.bodies.pairs import PlacedPart, Touch, distances, members
+from polycorner.bodies.neighbours import Pair, pairs
+from polycorner.bodies.pairs import PlacedPart, Touch, both_sharp, distances
 from polycorner.bodies.poses import Placement
 from polycorner.bodies.rigid_motions import carried, turned
 from polycorner.bodies.shapes import Part
@@ -254,23 +254,25 @@ def _check_turning(argument: str, rubbing: list[PlacedPart], given: Any) -> None
             refuse(argument, f"{missing}, those of {member.body!r} too", given)
 
 
-def is_sharp_in_space(*placements: Placement) -> bool:
-    """Whether bodies are polyhedra none of which is rounded."""
-    parts = [part for p in placements for part in p.body.parts.values()]
-    return all(part.radius == 0 and part.dimension == 3 for part in parts)
-
-
 def twins(
     placements: tuple[Placement, Placement], lattice: Lattice
-) -> tuple[tuple[Placement, ...], list[Touch]]:
-    """Return two bodies like given ones, called after these with 1 and 2, and their contacts."""
-    named = [(p, f"{p.name}{k}") for p, k in zip(placements, PAIR, strict=True)]
-    pair = tuple(replace(p, name=name, manifold=_renamed(p, name)) for p, name in named)
-    if is_sharp_in_space(*placements):
-        return pair, []  # those of hulls have no formulas
-    space = pair[0].manifold * pair[1].manifold
-    meeting = pairs(lattice, pair, {})
-    return pair, [t for parts in meeting for t in distances(space, *parts)]
+) -> tuple[tuple[Placement, Placement], list[Pair]]:
+    """Return two bodies like given ones, called after these with 1 and 2, and parts that meet."""
+    one, two = (
+        replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}"))
+        for p, k in zip(placements, PAIR, strict=True)
+    )
+    return (one, two), pairs(lattice, (one, two), {})
+
+
+def touching_twins(
+    placements: tuple[Placement, Placement], lattice: Lattice
+) -> tuple[tuple[Placement, Placement], list[Touch]]:
+    """Return these and their contacts, without those of polyhedra, which have no formulas."""
+    pair, meeting = twins(placements, lattice)
+    space, planar = pair[0].manifold * pair[1].manifold, pair[0].body.dimension == 2
+    smooth = (parts for parts in meeting if planar or not both_sharp(*parts))
+    return pair, [t for parts in smooth for t in distances(space, *parts)]
 
 
 def between(
@@ -281,11 +283,12 @@ def between(
     The two, which may be the same, are called after these, with 1 and 2, and so are their
     coordinates.  In a periodic box the second is the nearest image.
     """
-    if all(part.radius == 0 for p in placements for part in p.body.parts.values()):
-        return between_hulls(placements, lattice, known)
-    pair, touches = twins(placements, lattice)
+    pair, meeting = twins(placements, lattice)
+    space, d = pair[0].manifold * pair[1].manifold, pair[0].body.dimension
+    sharp = [parts for parts in meeting if both_sharp(*parts)]
+    touches = [t for parts in meeting if parts not in sharp for t in distances(space, *parts)]
     definitions, gaps = written_out({t.gap.name: t.gap for t in touches})
-    both, laws = motions(pair[0].manifold * pair[1].manifold), []
+    both, laws = motions(space), []
     name = "-".join(p.name for p in placements)
     for argument, given, kind, cause in (
         ("friction", known.friction, SLIDING, RUBBING),
@@ -294,57 +297,43 @@ def between(
         static, dynamic = given.get(name, NONE)
         if static == 0:
             continue
-        _check_turning(argument, [touches[0].one, touches[0].two], static)
-        d = pair[0].body.dimension
+        if sharp and argument == "rolling":
+            _refuse_rolling(static)
+        _check_turning(argument, [*meeting[0]], static)
         sets = _set(static, d), _set(dynamic, d)
         slips = {t.gap.name: slips_of(both, t, kind) for t in touches}
         laws.append(PairFriction(slips, *sets, cause))
-    return ContactFamily(
-        gaps,
-        sum(p.body.size for p in placements) / placements[0].manifold.scales[0],
-        tuple(dict.fromkeys(n for p in placements for n in p.manifold.names[: p.body.dimension])),
-        friction=tuple(laws),
-        restitution=known.restitution.get(name, 0.0),
-        definitions=definitions,
-    )
-
-
-def between_hulls(
-    placements: tuple[Placement, Placement], lattice: Lattice, known: Laws
-) -> HullContacts:
-    """Return the contacts of any two bodies like two given ones whose parts are all sharp."""
-    name = "-".join(p.name for p in placements)
-    if known.rolling.get(name, NONE)[0]:
-        msg = (
-            f"rolling: expected 0 between sharp polygons or polyhedra, which roll on no radius; "
-            f"got {known.rolling[name]}"
-        )
-        raise NotImplementedError(msg)
-    static, dynamic = known.friction.get(name, NONE)
-    d, scale = placements[0].body.dimension, placements[0].manifold.scales[0]
-    laws: tuple[PairLaw, ...] = ()
-    if static:
-        rubbing = [m for p in placements for m in members(p.name, p.body, p)]
-        _check_turning("friction", rubbing, static)
-        laws = (PairLaw(d - 1, _set(static, d), _set(dynamic, d)),)
-    one, two = (
-        [
-            _hull(f"{p.name}{k}.{part_name}" if part_name else f"{p.name}{k}", part)
-            for part_name, part in p.body.parts.items()
-        ]
-        for p, k in zip(placements, PAIR, strict=True)
-    )
+    scale, restitution = pair[0].manifold.scales[0], known.restitution.get(name, 0.0)
+    reach = sum(p.body.size for p in placements) / scale
+    position = tuple(dict.fromkeys(n for p in placements for n in p.manifold.names[:d]))
+    family = None
+    if touches:
+        told = {"restitution": restitution, "definitions": definitions}
+        family = ContactFamily(gaps, reach, position, friction=tuple(laws), **told)
+    if family is not None and not sharp:
+        return family
+    hulls = {m.name: m for parts in sharp for m in parts}
+    made = {name: _hull(name, member.part) for name, member in hulls.items()}
     return HullContacts(
-        [(first, second) for first in one for second in two],
-        (placements[0].manifold.size, placements[1].manifold.size),
-        OPTIONS.parting * scale,
-        OPTIONS.touching * scale,
+        [(made[one.name], made[two.name]) for one, two in sharp],
+        (pair[0].manifold.size, pair[1].manifold.size),
+        (OPTIONS.parting * scale, OPTIONS.touching * scale),
+        (*pair[0].manifold.names, *pair[1].manifold.names),
         lattice.lengths.tolist(),
-        sum(p.body.size for p in placements) / scale,
-        tuple(dict.fromkeys(n for p in placements for n in p.manifold.names[:d])),
-        laws,
-        known.restitution.get(name, 0.0),
+        reach,
+        position,
+        tuple(PairLaw(law.static.dimension, law.static, law.moving, law.kind) for law in laws),
+        restitution,
+        family,
     )
+
+
+def _refuse_rolling(given: float) -> NoReturn:
+    msg = (
+        f"rolling: expected 0 between sharp polygons or polyhedra, which roll on no radius; got "
+        f"{given}"
+    )
+    raise NotImplementedError(msg)
 
 
 def listed_hulls(one: PlacedPart, two: PlacedPart, scale: float) -> HullContacts:
@@ -358,12 +347,8 @@ def listed_hulls(one: PlacedPart, two: PlacedPart, scale: float) -> HullContacts
     return HullContacts(
         [(_hull(one.name, one.part), _hull(two.name, two.part))],
         (len(one.coordinates), len(two.coordinates)),
-        OPTIONS.parting * scale,
-        OPTIONS.touching * scale,
-        (),
-        2 * max(np.linalg.norm(m.part.points, axis=1).max() for m in (one, two)) / scale,
-        (),
-        reads=(*one.coordinates, *two.coordinates),
+        (OPTIONS.parting * scale, OPTIONS.touching * scale),
+        (*one.coordinates, *two.coordinates),
     )
 
 
@@ -374,11 +359,7 @@ def rubbing_hulls(
     d, rubbing = one.part.dimension, {}
     for label in contacts.names:
         if known.rolling.get(label, NONE)[0]:
-            msg = (
-                f"rolling: expected 0 between sharp polygons or polyhedra, which roll on no "
-                f"radius; got {known.rolling[label]} of {label}"
-            )
-            raise NotImplementedError(msg)
+            _refuse_rolling(known.rolling[label][0])
         static, dynamic = known.friction.get(label, NONE)
         if static:
             rubbing[label] = _set(static, d), _set(dynamic, d)

@@ -5,7 +5,7 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 from polycorner import checks
-from polycorner.bodies.dynamics import between, listed_hulls, twins
+from polycorner.bodies.dynamics import between, listed_hulls, touching_twins
 from polycorner.bodies.laws import Meeting, laws_of
 from polycorner.bodies.pairs import PlacedPart, both_sharp, distances
 from polycorner.bodies.poses import Placement
@@ -66,7 +66,7 @@ def assembly(
 
     def met(one: str, two: str) -> Any:
         by_name = {p.name: p for p in alone}
-        return twins((by_name[one], by_name[two]), alone[by_name[one]].lattice)
+        return touching_twins((by_name[one], by_name[two]), alone[by_name[one]].lattice)
 
     scenes = {name: system.scene for name, system in found.items()}
     ordered = {name: count[name] for name in found}

@@ -11,6 +11,7 @@ from polycorner import simulate
 from polycorner.bodies import (
     Arrangement,
     HalfSpace,
+    capsule,
     compound,
     disc,
     mass_of,
@@ -385,6 +386,35 @@ def test_painleves_rod_stops_at_once():
     assert np.diff(path.kinetic + path.potential).max() < 1e-6
     arm = [-end[1], end[0]]
     assert path.v[2, 0, :2] + path.v[2, 0, 2] * np.array(arm) == pytest.approx([0, 0], abs=0.05)
+
+
+def test_a_body_of_sharp_and_rounded_parts_moves_repeated_as_listed():
+    """Hammers, of which one falls on the other: a sharp head, and a handle with round ends."""
+    head, stick = brick(0.6, 0.4).moved([0, 1.0]), capsule([0, 0], [0, 1.0], 0.08)
+    hammer = compound({"head": head, "stick": stick})
+    a, repeated = on_the_floor(hammer, 2, friction=0.4)
+    two = Arrangement({"A1": hammer, "A2": hammer}, a.walls, orientations="all")
+    listed = two.system(gravity=[0, -G], friction=0.4)
+    start = np.array([[0, 0.3, -1.3], [0.1, 1.6, 0.9]])
+    first = simulate(repeated, repeated.state(start), 0.8, 1e-3)
+    second = simulate(listed, listed.state(start.ravel()), 0.8, 1e-3)
+    assert any(len(e.bodies) == 2 for e in first.events)
+    assert second.q.reshape(first.q.shape) == pytest.approx(first.q, abs=1e-5)
+
+
+@pytest.mark.parametrize("d", D)
+def test_a_fast_body_does_not_pass_through_a_thin_one(d):
+    """Though it goes a hundred times its thickness in a step."""
+    body = brick(0.02, *[1.0] * (d - 1))
+    low = {"low": HalfSpace(np.eye(d)[-1], -50 * np.eye(d)[-1])}
+    a = Arrangement({"A": body}, low, orientations="all")
+    system = a.system(count=2)
+    start = upright(a, [[0.0] * d, [-1.23, *[0.0] * (d - 1)]])
+    v = np.zeros(start.shape)
+    v[1, 0] = 200.0
+    path = simulate(system, system.state(start, v), 0.05, 1e-2)
+    assert path.v[-1, :, 0].sum() == pytest.approx(200.0, rel=1e-6)
+    assert path.q[-1, 1, 0] < path.q[-1, 0, 0]
 
 
 def test_threads_change_no_bit():

@@ -11,10 +11,11 @@ import numpy as np
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.kernels import address
 from polycorner.motion.bodies import PairContacts, PairLaw
+from polycorner.motion.contacts import ContactFamily
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.hulls.intermediate import NAMES, SHIPPED
 from polycorner.spaces.manifold import Array, Manifold
-from polycorner.values import Value
+from polycorner.values import Value, cached_property
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,9 @@ def _padded(vectors: Array) -> Array:
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
+VALUES = 9  # entry of a table for the address of formulas; that of their gradients follows
+
+
 class Machine(NamedTuple):
     """What callers look for in machine code: its address."""
 
@@ -77,6 +81,7 @@ class HullKernel:
 
     def __init__(self, key: str, names: tuple[str, str], variables: int, outputs: int) -> None:
         self.key, self.variables, self.outputs, self._names = key, variables, outputs, names
+        self.calls: Any = None
 
     def compiled(self, order: int) -> Machine:
         """Return the machine code for derivatives up to an order, 0 or 1."""
@@ -124,30 +129,32 @@ class HullContacts(Value):
     coordinates : (int, int)
         How many coordinates either body has: 2 or 3 in the plane, 3 or 7 in space, 0 if it is
         fixed.
-    through, zero : float
+    lengths : (float, float)
         Height up to which a plane passes through two hulls, and length that is none.
-    periods : sequence of float
+    reads : tuple of str
+        The coordinates of both.
+    periods : sequence of float, optional
         After which positions repeat; infinite if they do not.
-    reach, position, restitution
-        As in :class:`~polycorner.motion.ContactFamily`.
-    laws : tuple of PairLaw
-        Of dry friction.
-    reads : tuple of str, optional
-        Of two bodies of one system, or one and a fixed one, their coordinates.
+    reach, position, restitution : optional
+        Of bodies that are repeated, as in :class:`~polycorner.motion.ContactFamily`.
+    laws : tuple of PairLaw, optional
+        Of the dry friction of these.
+    further : ContactFamily, optional
+        Further contacts of these, which are formulas.
     friction : mapping from str to (ConvexSet, ConvexSet), optional
-        Of these, the static and the dynamic set at contacts that rub.
+        Of two bodies in one system, the static and the dynamic set at contacts that rub.
     """
 
     pairs: Sequence[tuple[Hull, Hull]]
     coordinates: tuple[int, int]
-    through: float
-    zero: float
-    periods: Sequence[float]
-    reach: float
-    position: tuple[str, ...]
+    lengths: tuple[float, float]
+    reads: tuple[str, ...]
+    periods: Sequence[float] = ()
+    reach: float = 0.0
+    position: tuple[str, ...] = ()
     laws: tuple[PairLaw, ...] = ()
     restitution: float = 0.0
-    reads: tuple[str, ...] = ()
+    further: ContactFamily | None = None
     friction: Mapping[str, tuple[ConvexSet, ConvexSet]] = field(default_factory=dict)
 
     @property
@@ -155,17 +162,17 @@ class HullContacts(Value):
         """The dimension of space."""
         return int(self.pairs[0][0].vertices.shape[1])
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
-        """The names of the contacts."""
+        """The names of the contacts of hulls."""
         return tuple(name for one, two in self.pairs for name in one.touches(two))
 
-    @property
+    @cached_property
     def table(self) -> list[float]:
         """The entries of the table; see ``geometry.py``."""
         periods = [p if np.isfinite(p) else 0.0 for p in (*self.periods, *[np.inf] * 3)[:3]]
-        head = [*self.coordinates, self.through, self.zero, *periods, self.dimension]
-        head += [len(self.names), len(self.pairs)]
+        head = [*self.coordinates, *self.lengths, *periods, self.dimension]
+        head += [len(self.names), 0, 0, len(self.pairs)]
         places: dict[int, int] = {}
         parts: list[float] = []
         listed: list[int] = []
@@ -224,32 +231,38 @@ class HullContacts(Value):
             "friction": {name: [*map(str, sets)] for name, sets in self.friction.items()},
             "restitution between bodies": self.restitution,
             "reach": self.reach,
+            "further": None if self.further is None else self.further.described(),
         }
 
     def compiled(self, manifold: Manifold, other: Manifold | None = None) -> PairContacts:
         """Return the compiled contacts of bodies with coordinates on a manifold, or on two."""
-        table, names, both = self.table, self.names, (manifold, other or manifold)
-        n = sum(one.size for one in both)
-        variables = tuple(f"{x}{k}" for k, one in enumerate(both, 1) for x in one.names)
-        kernel = HullKernel(self._key, ("values", "gradients"), n, len(names))
-        gaps = HullFamily(names, variables, kernel.key, kernel)
-        slips: tuple[tuple[HullFamily, bool, tuple[float, float]], ...] = ()
+        table, names, n = [*self.table], self.names, len(self.reads)
+        formulas = None if self.further is None else self.further.compiled(manifold, other)
+        key, more = self._key, ()
+        if formulas is not None:
+            codes = [formulas.gaps.kernel.compiled(order) for order in range(2)]
+            table[VALUES : VALUES + 2] = [float(code.point) for code in codes]
+            key, more = f"{key} {formulas.gaps.key}", formulas.gaps.names
+        kernel = HullKernel(key, ("values", "gradients"), n, len(names) + len(more))
+        kernel.calls = formulas  # lives as long as its address is in the table
+        gaps = HullFamily((*names, *more), self.reads, key, kernel)
+        slips: list[Any] = []
         if self.laws:
             rows = tuple(f"s{i}" for i in range(self.dimension - 1))
             slip = HullKernel("slips of hulls", ("slips", "slips"), 2 * n, len(rows))
-            family = HullFamily(
-                rows, (*variables, *(f"{x}_dot" for x in variables)), slip.key, slip
-            )
+            rates = tuple(f"{name}_dot" for name in self.reads)
+            family = HullFamily(rows, (*self.reads, *rates), slip.key, slip)
             # The table stands before the entries, of two numbers each.
             back = len(table)
-            slips = tuple(
-                (family, False, (float(g), float(back + 2 * g))) for g in range(len(names))
-            )
+            slips = [(family, False, (float(g), float(back + 2 * g))) for g in range(len(names))]
+            slips += [] if formulas is None else formulas.slips
+        one, two = self.coordinates
+        reads = [(0, c) for c in range(one)] + [(1, c) for c in range(two)]
         return PairContacts(
             gaps,  # type: ignore[arg-type]  # what is asked of a family, it has
             tuple(table),
-            tuple((body, c) for body, one in enumerate(both) for c in range(one.size)),
-            slips,  # type: ignore[arg-type]
+            tuple(reads),
+            tuple(slips),
             self.laws,
             self.restitution,
             self.reach,

@@ -12,7 +12,9 @@ is a plane through both, counts as over it: where corners lie on corners, as in 
 not pass from one to the other with every shift by a rounding error.  All close and slip along the
 one plane between the parts (:mod:`~polycorner.motion.hulls.planes`), at the point of the vertex or
 edge.  Where parts overlap and no gap says so, the contact of the plane itself, a face and the
-vertex that is deepest or two edges, has the height of the plane.
+vertex that is deepest or two edges, has the height of the plane.  Parts that are far from each
+other have one contact, the first, of the height of the plane at the vertex that is nearest to it:
+so no body passes through another, however fast it is.
 
 Rows: in the plane, velocities that keep both ends of the overlap of two parallel faces from closing
 keep all of it from closing, since the velocity along the normal is affine on it.  In space the
@@ -22,11 +24,13 @@ edges.
 
 import numpy as np
 
+from polycorner.formulas.compilation import call_kernel
 from polycorner.motion.hulls.geometry import (
     CONTACTS,
     DIMENSION,
     EDGES,
     FACES,
+    GRADIENTS,
     HEAD,
     ONE,
     PAIR,
@@ -35,6 +39,7 @@ from polycorner.motion.hulls.geometry import (
     THICKNESS,
     THROUGH,
     TWO,
+    VALUES,
     VERTICES,
     ZERO,
     add_motion,
@@ -53,7 +58,7 @@ from polycorner.motion.hulls.geometry import (
     whole,
 )
 from polycorner.motion.hulls.memory import compiled, get, put
-from polycorner.motion.hulls.planes import FIRST, SECOND, plane_between
+from polycorner.motion.hulls.planes import FIRST, SECOND, is_far, plane_between
 
 # How gradients are written: those of infinite gaps not at all, or none is infinite.
 PAIR_SLOPES, OWN_SLOPES = np.int64(1), np.int64(2)
@@ -153,6 +158,13 @@ def point_of(table, here, one, two, normal, g):
 
 
 @compiled
+def contacts_of(table, one, two):
+    """Return how many contacts two parts have."""
+    vertices = whole(table, one + VERTICES) + whole(table, two + VERTICES)
+    return vertices + whole(table, one + EDGES) * whole(table, two + EDGES)
+
+
+@compiled
 def show_overlap(q, table, here, s, f, J, slopes):
     """Give the contact of the plane between two parts its height, which is negative.
 
@@ -181,7 +193,19 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
     m, _, r, t = here
     one, two, g = parts_of(table, s)
     width = whole(table, ONE) + whole(table, TWO)
-    height, normal, _, _, _ = plane_between(table, one, two, r, t)
+    height, normal, kind, _, j = plane_between(table, one, two, r, t)
+    thickness = min(get(table, one + THICKNESS), get(table, two + THICKNESS))
+    # Finite where curvature is measured: a contact that acts may be none at the next midpoint.
+    none = np.inf if slopes == PAIR_SLOPES else thickness + max(height, 0.0)
+    if is_far(table, one, two, height):
+        for a in range(contacts_of(table, one, two)):
+            put(f, g + a, none)
+        slot = j if kind == FIRST else whole(table, two + VERTICES) + j
+        put(f, g, height)
+        if slopes:
+            x = point_of(table, here, one, two, normal, slot)
+            add_row(q, table, here, turned(m, normal), x, J + 8 * width * g, np.int64(0))
+        return
     along, inward, least = turned(m, normal), scaled(-1.0, back(r, normal)), np.inf
     for v in range(whole(table, two + VERTICES)):
         x = beyond(turned(r, triple(table, vertex_at(two, v))), 1.0, t)
@@ -199,14 +223,10 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
         if slopes:
             add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
         g += 1
-    thickness = min(get(table, one + THICKNESS), get(table, two + THICKNESS))
-    far = height > thickness
-    # Finite where curvature is measured: a contact that acts may be none at the next midpoint.
-    none = np.inf if slopes == PAIR_SLOPES else thickness + max(height, 0.0)
     edges, others = whole(table, one + EDGES), whole(table, two + EDGES)
     for b in range(others):
         at = edge_at(table, two, b)
-        other = not far and faces_along(table, at, inward)
+        other = faces_along(table, at, inward)
         y, v = beyond(turned(r, triple(table, at)), 1.0, t), turned(r, triple(table, at + 3))
         for a in range(edges):
             at, slot, gap, meets = edge_at(table, one, a), g + a * others + b, np.inf, 0.0
@@ -228,6 +248,11 @@ def gaps(q, table, f, J, slopes):
     here = places(q, table)
     for s in range(whole(table, PAIRS)):
         evaluate_parts(q, table, here, s, f, J, slopes)
+    formulas = whole(table, GRADIENTS if slopes else VALUES)
+    if formulas != 0:
+        count = whole(table, CONTACTS)
+        width = whole(table, ONE) + whole(table, TWO)
+        call_kernel(formulas, q, table, f + 8 * count, J + 8 * width * count, q)
     return 0
 
 
@@ -310,10 +335,9 @@ def all_slips(q, table, f, J, H):
     for s in range(whole(table, PAIRS)):
         one, two, first = parts_of(table, s)
         height, normal, _, _, _ = plane_between(table, one, two, r, t)
-        if height > min(get(table, one + THICKNESS), get(table, two + THICKNESS)):
+        if is_far(table, one, two, height):
             continue
-        vertices = whole(table, one + VERTICES) + whole(table, two + VERTICES)
-        for g in range(vertices + whole(table, one + EDGES) * whole(table, two + EDGES)):
+        for g in range(contacts_of(table, one, two)):
             x = point_of(table, here, one, two, normal, g)
             add_slip(q, table, here, turned(m, normal), x, f, J, rows * (first + g))
     return 0

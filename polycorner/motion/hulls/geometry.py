@@ -6,9 +6,10 @@ from polycorner.motion.hulls.memory import compiled, get, put
 
 # Entries of a table, and of a part in it.  Those before the parts: coordinates of either body, the
 # height up to which a plane passes through both, the length that is none, the periods, dimension,
-# number of contacts and of pairs of parts, and of each pair the places of both parts and its first
-# contact.
-ONE, TWO, THROUGH, ZERO, PERIODS, DIMENSION, CONTACTS, PAIRS, HEAD = 0, 1, 2, 3, 4, 7, 8, 9, 10
+# number of contacts, addresses of formulas of further ones (values, gradients; or 0), number of
+# pairs of parts, and of each pair the places of both parts and its first contact.
+ONE, TWO, THROUGH, ZERO, PERIODS, DIMENSION = 0, 1, 2, 3, 4, 7
+CONTACTS, VALUES, GRADIENTS, PAIRS, HEAD = 8, 9, 10, 11, 12
 PAIR = 3  # numbers of a pair
 VERTICES, FACES, EDGES, CENTRE, THICKNESS, SHAPE = 0, 1, 2, 3, 6, 7
 FACE, EDGE = 4, 12  # numbers of a face: normal, height; of an edge: point, direction, two normals

@@ -50,6 +50,15 @@ from polycorner.motion.hulls.memory import compiled, get
 FIRST, SECOND, BOTH = np.int64(0), np.int64(1), np.int64(2)
 
 
+NEARBY = 0.125  # height up to which parts are near each other, of half the lesser thickness
+
+
+@compiled
+def is_far(table, one, two, height):
+    """Return whether a plane of a height keeps two parts far from each other."""
+    return height > NEARBY * min(get(table, one + THICKNESS), get(table, two + THICKNESS))
+
+
 @compiled
 def lowest(table, part, normal):
     """Return the least product of a vector with the vertices of a part, and its vertex."""
@@ -95,8 +104,8 @@ def plane_between(table, one, two, m, t):
             if better:
                 best, normal, kind, i, j = height, out, side, np.int64(f), v
                 nearest = dot(out, toward)
-    far = min(get(table, one + THICKNESS), get(table, two + THICKNESS))
-    if not through and best < far and get(table, DIMENSION) == 3.0:
+    far = is_far(table, one, two, best)
+    if not (through or far) and get(table, DIMENSION) == 3.0:
         return edges_between(table, one, two, m, t, best + slack, (best, normal, kind, i, j))
     return best, normal, kind, i, j
 
