@@ -78,6 +78,11 @@ GROUPS = (
         {"": "sensitivity Sensitivity", "minimisation": "Crossing crossing"},
     ),
     Group(
+        "Follow equilibria",
+        "Equilibria over a parameter, with the events at which they change, begin and end.",
+        {"branches": "branches Diagram Arc BranchEvent BranchKind"},
+    ),
+    Group(
         "Prove and list",
         "Theorems in ball arithmetic: of points, minima, all stationary points, all corners.",
         {

@@ -18,6 +18,7 @@ ROOMS = (
     "polycorner.minimisation",
     "polycorner.proofs",
     "polycorner.landscapes",
+    "polycorner.branches",
     "polycorner.motion",
     "polycorner.bodies",
     "polycorner.models",

@@ -308,8 +308,14 @@ def between(
     position = tuple(dict.fromkeys(n for p in placements for n in p.manifold.names[:d]))
     family = None
     if touches:
-        told = {"restitution": restitution, "definitions": definitions}
-        family = ContactFamily(gaps, reach, position, friction=tuple(laws), **told)
+        family = ContactFamily(
+            gaps,
+            reach,
+            position,
+            friction=tuple(laws),
+            restitution=restitution,
+            definitions=definitions,
+        )
     if family is not None and not sharp:
         return family
     hulls = {m.name: m for parts in sharp for m in parts}

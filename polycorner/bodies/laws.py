@@ -25,8 +25,9 @@ BETWEEN = "between"  # the name of the contacts among repeated bodies
 
 Both = tuple[float, float]  # static and dynamic
 Coefficient = float | Both
-Coefficients = Coefficient | Mapping[str | tuple[str, str], Coefficient]
-Restitution = float | Mapping[str | tuple[str, str], float]
+# Names are words and pairs of them, of which a mapping may have both.
+Coefficients = Coefficient | Mapping[Any, Coefficient]
+Restitution = float | Mapping[Any, float]
 
 T = TypeVar("T")
 

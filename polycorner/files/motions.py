@@ -257,9 +257,9 @@ def read_motion(content: "xr.Dataset", system: MechanicalSystem, q: Array, v: Ar
     touches = {"touch": table("touch", "instant"), "touch_force": of("touch_force", -1)}
     rubbing: dict[str, Any] = {}
     if "rub_law" in content:
-        whole = [of(f"rub_{name}", -1, kind="i") for name in RUBBING]
+        rows = [of(f"rub_{name}", -1, kind="i") for name in RUBBING]
         forces = [of(f"rub_force_{k}", -1) for k in range(2)]
-        rubbing = {"rub": np.stack(whole, axis=1), "rub_force": np.stack(forces, axis=1)}
+        rubbing = {"rub": np.stack(rows, axis=1), "rub_force": np.stack(forces, axis=1)}
     numbers = np.stack([of("event_time", -1), of("event_impulse", -1)], axis=1)
     events = {"event": table("event", "kind"), "event_numbers": numbers}
     costs = {

@@ -9,6 +9,7 @@ are linearised in the point, the multipliers and the parameters at once.  All de
 of compiled kernels whose variables are coordinates and parameters alike, so they are exact.
 """
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -26,9 +27,12 @@ from polycorner.formulas.rows import SparseRows
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.findings import Analysis, FaceSize
+from polycorner.minimisation.problem import Problem, pose
 from polycorner.minimisation.sparse.factorisation import Saddle, lengths
 from polycorner.minimisation.sparse.optimality import nondegenerate
 from polycorner.polyhedra.cones import null_space, unit_rows
+from polycorner.polyhedra.groups import AllOf, AnyOf
+from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.values import cached_property
 
@@ -253,6 +257,67 @@ def lifted_family(
     rest = tuple(p for p in family.parameters if p not in lifted)
     symbols, held = family.variables + lifted, family.stationary
     return Family(names, symbols, rest, family.formulas, key, family.unit, stationary=held)
+
+
+def lifted_problem(problem: Problem, names: Sequence[str]) -> Problem:
+    """Return a problem with some parameters as additional coordinates.
+
+    Raises
+    ------
+    ValueError
+        If a parameter has the name of a coordinate.
+    """
+    d = problem.polyhedron
+    taken = [name for name in names if name in d.manifold.names]
+    if taken:
+        checks.refuse("parameters", "names that no coordinate has", ", ".join(taken))
+    extended = d.manifold * Manifold(tuple(names), (math.inf,) * len(names))
+    functions = [_lifted(f, extended, frozenset(names)) for f in problem.functions]
+    m = problem.inequalities
+    return pose(Polyhedron(extended, _tree(d.tree, functions[:m]), functions[m:-1]), functions[-1])
+
+
+def problem_with(problem: Problem, values: Mapping[str, float]) -> Problem:
+    """Return a problem with other values of some parameters."""
+    d, m = problem.polyhedron, problem.inequalities
+    manifold = d.manifold
+    functions = [
+        SmoothFunction.member(
+            f.family,
+            f.member_name,
+            manifold,
+            parameters=[
+                values.get(name, value)
+                for name, value in zip(f.family.parameters, f.parameters, strict=True)
+            ],
+            reads=[manifold.names[i] for i in f.reads],
+            label=f.name,
+        )
+        for f in problem.functions
+    ]
+    stated = functions[m : m + len(d.stated)]
+    return pose(Polyhedron(manifold, _tree(d.tree, functions[:m]), stated), functions[-1])
+
+
+def _lifted(f: SmoothFunction, manifold: Manifold, chosen: frozenset[str]) -> SmoothFunction:
+    family = lifted_family(f.family, frozenset({f.member_name}), chosen)
+    own = tuple(p for p in f.family.parameters if p in chosen)
+    values = dict(zip(f.family.parameters, f.parameters, strict=True))
+    return SmoothFunction.member(
+        family,
+        f.member_name,
+        manifold,
+        parameters=[values[p] for p in family.parameters],
+        reads=[*(manifold.names[i] for i in f.reads), *own],
+        label=f.name,
+    )
+
+
+def _tree(tree: Any, functions: list[SmoothFunction]) -> Any:
+    if isinstance(tree, int):
+        return functions[tree]
+    kind = AnyOf if tree.union else AllOf
+    return kind(*[_tree(child, functions) for child in tree.children])
 
 
 def partial_derivatives(function: SmoothFunction, point: Array, rates: Rates) -> Array:

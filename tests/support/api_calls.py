@@ -11,6 +11,7 @@ from landscape_values import double_well, tree
 import polycorner
 from polycorner import (
     bodies,
+    branches,
     dumbbells,
     files,
     landscapes,
@@ -75,6 +76,8 @@ VALUES = {
     "CornerPoint": lambda: of.corner_list().points[0],
     "CriticalConfiguration": lambda: of.critical()[0],
     "CriticalSearch": lambda: of.disks().critical_search(0, starts=3),
+    "Diagram": lambda: branches.branches(of.certificate(), "a", (0.5, 1.5)),
+    "Arc": lambda: branches.branches(of.certificate(), "a", (0.5, 1.5)).arcs[0],
     "Crossing": lambda: minimisation.crossing(of.certificate(), "left", "a"),
     "CutDisc": lambda: motion.CutDisc(0.3, 0.1),
     "Cylinder": lambda: bodies.Cylinder(3.0),
@@ -228,6 +231,12 @@ CALLS = {
         "active": ["left", "bottom"],
     },
     "sensitivity": lambda: {"certificate": of.certificate()},
+    "branches.branches": lambda: {
+        "certificate": of.certificate(),
+        "parameter": "a",
+        "interval": (0.5, 1.5),
+    },
+    "Diagram.at": lambda: {"value": 1.0},
     "minimisation.crossing": lambda: {
         "certificate": of.certificate(),
         "contact": "left",

@@ -238,7 +238,8 @@ class HullContacts(Value):
         """Return the compiled contacts of bodies with coordinates on a manifold, or on two."""
         table, names, n = [*self.table], self.names, len(self.reads)
         formulas = None if self.further is None else self.further.compiled(manifold, other)
-        key, more = self._key, ()
+        key = self._key
+        more: tuple[str, ...] = ()
         if formulas is not None:
             codes = [formulas.gaps.kernel.compiled(order) for order in range(2)]
             table[VALUES : VALUES + 2] = [float(code.point) for code in codes]

@@ -34,7 +34,7 @@ from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms
 from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
-from polycorner.minimisation.parametric import lifted_family
+from polycorner.minimisation.parametric import lifted_problem
 from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -76,40 +76,12 @@ def with_parameters(
         If a parameter has the name of a coordinate.
     """
     d, names = problem.polyhedron, tuple(sides)
-    taken = [name for name in names if name in d.manifold.names]
-    if taken:
-        checks.refuse("parameters", "names that no coordinate has", ", ".join(taken))
-    extended = d.manifold * Manifold(names, (math.inf,) * len(names))
-    functions = [_lifted(f, extended, frozenset(names)) for f in problem.functions]
-    m = problem.inequalities
-    everything = pose(
-        Polyhedron(extended, _tree(d.tree, functions[:m]), functions[m:-1]), functions[-1]
-    )
+    everything = lifted_problem(problem, names)
+    extended = everything.polyhedron.manifold
     n, ends = d.manifold.size, np.array(list(sides.values()))
     lower, upper = (np.r_[side, ends[:, k]] for k, side in enumerate((found.lower, found.upper)))
     places = tuple(range(n, n + len(names)))
     return everything, Domain(extended, lower, upper, places), _extended(symmetry, n, len(names))
-
-
-def _lifted(f: SmoothFunction, manifold: Manifold, chosen: frozenset[str]) -> SmoothFunction:
-    family = lifted_family(f.family, frozenset({f.member_name}), chosen)
-    own = tuple(p for p in f.family.parameters if p in chosen)
-    values = dict(zip(f.family.parameters, f.parameters, strict=True))
-    return SmoothFunction.member(
-        family,
-        f.member_name,
-        manifold,
-        parameters=[values[p] for p in family.parameters],
-        reads=[*(manifold.names[i] for i in f.reads), *own],
-        label=f.name,
-    )
-
-
-def _tree(tree: Any, functions: "list[SmoothFunction]") -> Any:
-    if isinstance(tree, int):
-        return functions[tree]
-    kind = AnyOf if tree.union else AllOf
-    return kind(*[_tree(child, functions) for child in tree.children])
 
 
 def _extended(symmetry: Symmetry | None, n: int, count: int) -> Symmetry | None:

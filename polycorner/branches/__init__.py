@@ -1,0 +1,5 @@
+"""Equilibria over a parameter: arcs, and the events at which they change."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,188 @@
+"""Events: points at which arcs of equilibria end, and all arcs that leave them.
+
+*Something vanishes.*  Let ``W`` be the inequalities that vanish there with multiplier zero.  Every
+subset ``V`` of them is a face, those with a positive multiplier added.  Where its equations have a
+regular curve with the tangent ``t``, an arc leaves along ``t`` if along it the multipliers of ``V``
+grow, the functions of the rest of ``W`` grow, and so does the energy's multiplier if it vanishes;
+all to first order.  One of them that is zero leaves the event undecided.  A single function leads
+from one arc to exactly one other ([KojimaHirabayashi] sec. 4): if the parameter goes on, the
+equilibrium persists; if it turns back, this is a corner limit ([SchulzPellegrino]), at which the
+index of the two arcs differs by one.
+
+*A curvature along the face vanishes.*  If the curve is regular, the parameter turns back: a fold.
+Where the Jacobian loses one more rank, with kernel ``t, w`` and left kernel ``z``, curves leave
+along the zeros of the form ``z F''`` on the kernel; ``t`` is one, so that ``2 q_tw w - q_ww t`` is
+the other ([Gov] ch. 6).
+
+*Gradients depend.*  Where the energy's multiplier vanishes, ``sum mu_i df_i = 0`` with ``mu > 0``,
+and ``D`` lies where ``sum mu_i f_i >= 0``.  If the Hessian of this sum is negative definite on the
+directions across all ``df_i``, ``D`` is a single point there: a component vanishes.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import chain, combinations
+
+import numpy as np
+
+from polycorner.branches.continuation import Stop, Way
+from polycorner.branches.diagram import BranchKind
+from polycorner.branches.system import Face, FritzJohn
+from polycorner.polyhedra.cones import null_space, unit_rows
+from polycorner.polyhedra.strata import local_pieces
+from polycorner.spaces.manifold import Array
+
+MOST_WEAK = 10  # functions that vanish at one event
+# Kinds that are told by what leaves an event.
+TOLD = BranchKind.OPENS
+
+
+@dataclass
+class Arm:
+    """A direction in which an arc leaves an event, and its number once it was followed."""
+
+    face: Face
+    direction: Array
+    arc: int = -1
+
+
+@dataclass
+class Node:
+    """An event: where, of what kind, what vanishes, and the arcs that leave it."""
+
+    at: FritzJohn
+    kind: BranchKind
+    weak: tuple[int, ...] = ()
+    arms: list[Arm] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def decided(self) -> bool:
+        """Whether all that leaves it is known."""
+        return not self.notes and self.kind is not BranchKind.UNDECIDED
+
+
+def event_at_end(way: Way) -> Node:
+    """Return the event at the end of a part of a curve."""
+    at = way.last
+    if way.stop is Stop.FAR:
+        return Node(at, BranchKind.FAR)
+    if way.stop in {Stop.LOST, Stop.LONG}:
+        return Node(at, BranchKind.UNDECIDED, notes=[way.stop.value])
+    return flat_event(at, way.tangent) if way.stop is Stop.FLAT else weak_event(at)
+
+
+def weak_event(at: FritzJohn) -> Node:
+    """Return the event where functions or multipliers vanish."""
+    system, m = at.system, at.system.problem.inequalities
+    values, small = at.watched()[0], 10 * at.system.tolerances.zero
+    vanish = abs(values) <= small
+    weak = tuple(np.flatnonzero(vanish[:m]).tolist())
+    if vanish[m + 1] or vanish[m + 2]:
+        return Node(at, BranchKind.END, weak)
+    node = Node(at, TOLD, weak)
+    if len(weak) > MOST_WEAK:
+        node.notes.append(f"{len(weak)} functions vanish there, more than {MOST_WEAK}")
+        return node
+    firm = set(at.face).difference(weak)
+    # Relations of equations alone hold with either sign.
+    signs = (1.0, -1.0) if vanish[m] and not firm else (1.0,)
+    for chosen in chain.from_iterable(combinations(weak, r) for r in range(len(weak) + 1)):
+        face = tuple(sorted(firm.union(chosen)))
+        for sign in signs:
+            x = system.guess(face, at.u, at.s, sign * at.mu)
+            node.arms += _leaving(system.point(face, x), node, also=bool(vanish[m]))
+    return node
+
+
+def _leaving(here: FritzJohn, node: Node, *, also: bool) -> Iterator[Arm]:
+    """Yield the arcs of a face that leave an event where functions vanish."""
+    system, m = here.system, here.system.problem.inequalities
+    sizes, vectors = here.kernel()
+    if sizes[1] <= system.tolerances.dependent:
+        node.notes.append("several curves of one face cross where functions vanish")
+        return
+    values, slopes = here.watched()
+    t, weak = vectors[0], list(node.weak)
+    rates = slopes @ t
+    least = system.tolerances.same
+    if (abs(rates[[*weak, *([m] if also else [])]]) <= least).any():
+        node.notes.append("something vanishes to second order")
+        return
+    for side in (1.0, -1.0):
+        away = values[:m].copy()
+        away[weak] = side * rates[weak]
+        held = list(here.face)
+        pressed = (away[held] > 0).all() and (not also or side * rates[m] > 0)
+        away[held] = 0.0
+        pieces = local_pieces(
+            system.problem.polyhedron, np.concatenate([away, np.zeros(system.others)]), least / 2
+        )
+        if pressed and pieces == [frozenset(here.face)]:
+            yield Arm(here.face, side * t)
+
+
+def flat_event(at: FritzJohn, t: Array) -> Node:
+    """Return the event where a curvature along the face vanishes, with the tangent of arrival."""
+    tolerances = at.system.tolerances
+    sizes, vectors = at.kernel()
+    if sizes[1] > tolerances.beside:
+        return Node(at, BranchKind.FOLD, arms=[Arm(at.face, at.tangent(t))])
+    node = Node(at, BranchKind.BRANCH, arms=[Arm(at.face, t), Arm(at.face, -t)])
+    if sizes[2] <= tolerances.beside:
+        node.notes.append("several curvatures vanish together")
+        return node
+    plane = vectors[:2] - np.outer(vectors[:2] @ t, t)
+    w = plane[int(np.argmax(np.linalg.norm(plane, axis=1)))]
+    w /= np.linalg.norm(w)
+    h = tolerances.beside
+    change = [
+        at.system.point(at.face, at.x + h * v).jacobian
+        - at.system.point(at.face, at.x - h * v).jacobian
+        for v in (t, w)
+    ]
+    # Rows that are dependent by symmetry, which hold identically, give no form.
+    left = null_space(at.jacobian.T, tolerances.beside)
+    forms = np.array([left.T @ (change[0] @ w), left.T @ (change[1] @ w)]) / (2 * h)
+    q_tw, q_ww = forms[:, int(np.argmax(abs(forms[0])))].tolist()
+    if abs(q_tw) <= tolerances.near:
+        node.notes.append("curves touch there")
+        return node
+    way = 2 * q_tw * w - q_ww * t
+    way /= np.linalg.norm(way)
+    node.arms += [Arm(at.face, way), Arm(at.face, -way)]
+    return node
+
+
+def kind_of(node: Node) -> BranchKind:
+    """Return the kind of an event, by what leaves it."""
+    if node.kind is not TOLD:
+        return node.kind
+    if node.notes:
+        return BranchKind.UNDECIDED
+    n, m = node.at.system.n, node.at.system.problem.inequalities
+    if len(node.arms) == 1:
+        if abs(node.at.x[-1]) > node.at.system.tolerances.same or node.at.watched()[0][m] > 0.5:
+            return BranchKind.RE_ENTRANT
+        return BranchKind.VANISHES if _is_point(node.at) else BranchKind.DEPENDENT
+    if len(node.arms) > 2:
+        return BranchKind.BRANCH
+    one, two = sorted(node.arms, key=lambda arm: float(arm.direction[n]))
+    if one.direction[n] * two.direction[n] > 0:
+        return BranchKind.CORNER_LIMIT
+    if len(one.face) == len(two.face):
+        return BranchKind.EXCHANGE
+    return BranchKind.OPENS if len(one.face) > len(two.face) else BranchKind.CLOSES
+
+
+def _is_point(at: FritzJohn) -> bool:
+    """Whether the polyhedron near a point at which gradients depend is this point alone."""
+    system, n = at.system, at.system.n
+    rows = [i for i in at.face if at.mu[i] > system.tolerances.same]
+    if not rows or system.is_union:
+        return False
+    held = unit_rows(at.known.gradients[[*rows, *system.equations], :n])
+    basis = null_space(np.vstack([held, at.orbit]), system.tolerances.rank)
+    bent = np.einsum("i,ijk->jk", at.mu[:-1], at.known.hessians[:-1, :n, :n])
+    values = np.linalg.eigvalsh(basis.T @ bent @ basis)
+    return bool((values < -system.tolerances.same).all())

@@ -1,0 +1,434 @@
+"""The search for all arcs of equilibria that are connected with given ones."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from polycorner import checks
+from polycorner.branches.continuation import Stop, Way, corrected, follow
+from polycorner.branches.diagram import Arc, BranchEvent, Diagram
+from polycorner.branches.events import (
+    TOLD,
+    Arm,
+    Node,
+    event_at_end,
+    kind_of,
+    weak_event,
+)
+from polycorner.branches.system import Face, FritzJohn, System
+from polycorner.kinds import checked
+from polycorner.minimisation.certificate import Certificate
+from polycorner.minimisation.parametric import lifted_problem
+from polycorner.polyhedra.equations import independent_equations
+from polycorner.polyhedra.quotients import WalkOptions
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.progress import Progress, silent
+from polycorner.searches import Ending, Task, work_through
+
+UNITS = 5.0  # of the continuation in the interval: a step is at most a tenth of it by default
+
+
+@dataclass
+class _Edge:
+    """An arc: the points on it, and the events at its ends; -1 where there is none."""
+
+    face: Face
+    points: list[FritzJohn]
+    ends: list[int]
+
+
+class _Search:
+    def __init__(self, system: System, options: WalkOptions, extent: float) -> None:
+        self.system, self.options, self.extent = system, options, extent
+        self.nodes: list[Node] = []
+        self.edges: list[_Edge] = []
+
+    def begin(self, at: FritzJohn) -> None:
+        """Follow the curve through an equilibrium both ways, as one arc."""
+        if any(self._passes(edge, at) for edge in self.edges):
+            return
+        back, on = (self._follow(at, side * at.tangent()) for side in (-1.0, 1.0))
+        if back.stop is Stop.CLOSED:
+            self.edges.append(_Edge(at.face, back.points, [-1, -1]))
+            return
+        self.edges.append(_Edge(at.face, [*back.points[::-1], *on.points[1:]], [-1, -1]))
+        for end, way in enumerate((back, on)):
+            self._arrive(way, len(self.edges) - 1, end)
+
+    def begin_at_event(self, at: FritzJohn) -> None:
+        """Take an equilibrium on which functions vanish without a multiplier."""
+        if self._known(at) is None:
+            self.nodes.append(weak_event(at))
+
+    def tasks(self, most: int) -> Iterator[Task]:
+        """Yield the arcs that leave events and were not followed yet, to be followed."""
+        while True:
+            waiting = (
+                (k, arm) for k, node in enumerate(self.nodes) for arm in node.arms if arm.arc < 0
+            )
+            first = next(waiting, None)
+            if first is None:
+                return
+            yield len(self.edges) < most, partial(self._leave, *first)
+
+    def told(self) -> tuple[float, float | None, str]:
+        """Return how far the search has come."""
+        waiting = sum(arm.arc < 0 for node in self.nodes for arm in node.arms)
+        return len(self.edges), len(self.edges) + waiting, "arcs"
+
+    def _follow(self, at: FritzJohn, direction: np.ndarray) -> Way:
+        return follow(at, direction, self.options, extent=self.extent)
+
+    def _leave(self, k: int, arm: Arm) -> None:
+        at = self.nodes[k].at
+        sign = 1.0 if at.x[-1] >= 0 else -1.0
+        x = self.system.guess(arm.face, at.u, at.s, sign * at.mu)
+        way = self._follow(self.system.point(arm.face, x), arm.direction)
+        arm.arc = len(self.edges)
+        self.edges.append(_Edge(arm.face, way.points, [k, -1]))
+        self._arrive(way, arm.arc, 1)
+
+    def _arrive(self, way: Way, edge: int, end: int) -> None:
+        """Register the end of an arc at an event, a new one or one that is known."""
+        at, back = way.last, -way.tangent
+        k = self._known(at)
+        if k is None:
+            k = len(self.nodes)
+            self.nodes.append(event_at_end(way))
+        node = self.nodes[k]
+        self.edges[edge].ends[end] = k
+        for arm in node.arms:
+            if arm.arc < 0 and arm.face == at.face and arm.direction @ back > 0.9:
+                arm.arc = edge
+                return
+        node.arms.append(Arm(at.face, back, edge))
+
+    def _apart(self, one: FritzJohn, two: FritzJohn) -> float:
+        """Return how far two points are apart, with their multipliers."""
+        system = self.system
+        moved = system.manifold.chord(system.place(one.u), system.place(two.u))
+        parts = (moved / system.manifold.scale_array, one.mu - two.mu, [one.s - two.s])
+        return max(float(np.abs(part).max(initial=0.0)) for part in parts)
+
+    def _known(self, at: FritzJohn) -> int | None:
+        near = self.system.tolerances.near
+        found = (k for k, node in enumerate(self.nodes) if self._apart(node.at, at) <= near)
+        return next(found, None)
+
+    def _passes(self, edge: _Edge, at: FritzJohn) -> bool:
+        """Whether an arc goes through a point."""
+        n = self.system.n
+        for one, two in zip(edge.points, edge.points[1:], strict=False):
+            if edge.face != at.face or not (one.s - at.s) * (two.s - at.s) <= 0:
+                continue
+            part = (at.s - one.s) / ((two.s - one.s) or 1.0)
+            pin = np.eye(len(at.x))[n]
+            guess = one.x + part * (two.x - one.x)
+            found = corrected(self.system, at.face, guess, pin, math.inf)
+            if found is not None and self._apart(found, at) <= self.system.tolerances.near:
+                return True
+        return False
+
+    def contract(self) -> None:
+        """Join events that an arc of no length connects, and arcs where nothing happens."""
+        n, same = self.system.n, self.system.tolerances.same
+        for k, edge in enumerate(self.edges):
+            one, two = edge.ends
+            places = np.array([p.x[: n + 1] for p in edge.points])
+            if min(one, two) < 0 or one == two or np.ptp(places, axis=0).max() > same:
+                continue
+            kept, gone = self.nodes[one], self.nodes[two]
+            kept.kind = gone.kind if kept.kind is TOLD else kept.kind
+            kept.at = min(kept.at, gone.at, key=lambda at: abs(float(at.x[-1])))
+            kept.weak = tuple(sorted({*kept.weak, *gone.weak}))
+            kept.notes += gone.notes
+            kept.arms = [arm for arm in (*kept.arms, *gone.arms) if arm.arc != k]
+            gone.arms, edge.points = [], []
+            self._redirect(two, one)
+        for k, node in enumerate(self.nodes):
+            arms = node.arms
+            nothing = node.kind is TOLD and not node.notes and len(arms) == 2
+            if nothing and arms[0].face == arms[1].face and arms[0].arc != arms[1].arc:
+                self._join(k, arms[0].arc, arms[1].arc)
+
+    def _redirect(self, old: int, new: int) -> None:
+        for edge in self.edges:
+            edge.ends = [new if end == old else end for end in edge.ends]
+
+    def _join(self, k: int, one: int, two: int) -> None:
+        """Append an arc to another at an event where nothing happens."""
+        first, second = self.edges[one], self.edges[two]
+        if first.ends[0] == k:
+            first.points, first.ends = first.points[::-1], first.ends[::-1]
+        if second.ends[1] == k:
+            second.points, second.ends = second.points[::-1], second.ends[::-1]
+        first.points, first.ends = (
+            [*first.points, *second.points[1:]],
+            [
+                first.ends[0],
+                second.ends[1],
+            ],
+        )
+        second.points, self.nodes[k].arms = [], []
+        for node in self.nodes:
+            for arm in node.arms:
+                arm.arc = one if arm.arc == two else arm.arc
+
+
+@checked
+def branches(  # noqa: PLR0913 - keywords of one search
+    certificate: Certificate | Sequence[Certificate],
+    parameter: str | Mapping[str, float],
+    interval: tuple[float, float],
+    *,
+    symmetry: Symmetry | None = None,
+    extent: float = math.inf,
+    options: WalkOptions | None = None,
+    max_arcs: int = 500,
+    max_seconds: float = math.inf,
+    progress: Progress = silent,
+) -> Diagram:
+    """Follow equilibria over a parameter through all events, until an interval is covered.
+
+    Equilibria are points at which the energy is stationary on a face, with multipliers ``dE/df >=
+    0`` of the active inequalities; they need not be minima.  At every event all arcs that leave it
+    are followed in turn (:mod:`polycorner.branches.events`).  Curves that are not connected with
+    the start are not found.
+
+    Parameters
+    ----------
+    certificate : Certificate, or sequence of Certificate
+        Equilibria to start from, at values of the parameter in the interval, with independent
+        active gradients.
+    parameter : str or mapping from str to float
+        A parameter of the problem's functions; or several with their rates: then the value is the
+        change from those of the (first) certificate.
+    interval : (float, float)
+        Values of the parameter, ascending.
+    symmetry : Symmetry, optional
+        The continuous symmetries, modulo which equilibria are isolated.
+    extent : float, optional
+        Distance from the start of an arc, in scale units, beyond which it is not followed.
+    options : WalkOptions, optional
+        Steps along the arcs, in scale units and fifths of the interval.
+    max_arcs, max_seconds : int, float, optional
+        Arcs and time after which the search ends; the diagram is not :attr:`Diagram.closed` then.
+    progress : callable, optional
+        Told the numbers of arcs followed and known.
+
+    Returns
+    -------
+    Diagram
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the argument, what was expected and what came.
+
+    Examples
+    --------
+    A ball on a spring is pressed against a wall as the spring's foot ``t`` moves behind it:
+
+    >>> import sympy
+    >>> from polycorner import Manifold, Polyhedron, SmoothFunction, minimise
+    >>> from polycorner.branches import branches
+    >>> M = Manifold.euclidean("x")
+    >>> (x,) = M.symbols
+    >>> t = sympy.Symbol("t")
+    >>> spring = SmoothFunction("energy", (x - t) ** 2 / 2, M, parameters={"t": 1.0})
+    >>> c = minimise(Polyhedron(M, {"wall": x}), spring, [1.0])
+    >>> d = branches(c, "t", (-1.0, 2.0))
+    >>> [(event.kind.name, event.parameter) for event in d.events]
+    [('END', -1.0), ('OPENS', 0.0), ('END', 2.0)]
+    """
+    several = [certificate] if isinstance(certificate, Certificate) else [*certificate]
+    if not several:
+        checks.refuse("certificate", "at least one", several)
+    low, high = _interval(interval)
+    checks.real("extent", extent, above=0, infinite=True)
+    checks.real("max_seconds", max_seconds, above=0, infinite=True)
+    checks.whole("max_arcs", max_arcs, least=1)
+    rates = {parameter: 1.0} if isinstance(parameter, str) else dict(parameter)
+    system = _system(several[0], rates, (low, high), parameter, symmetry or Symmetry())
+    search = _Search(system, options or WalkOptions(), extent)
+    for one in several:
+        at = _start(system, one, rates, parameter, (low, high))
+        search.begin_at_event(at) if one.found.weak else search.begin(at)
+    ending = work_through(search.tasks(max_arcs), search.told, progress, seconds=max_seconds)
+    search.contract()
+    done = ending is Ending.FINISHED and all(node.decided for node in search.nodes)
+    return _diagram(search, several[0], rates, parameter, (low, high), done)
+
+
+def _interval(given: object) -> tuple[float, float]:
+    ends = checks.numbers("interval", given, "two finite numbers, ascending")
+    if ends.shape != (2,) or not np.isfinite(ends).all() or not ends[0] < ends[1]:
+        checks.refuse("interval", "two finite numbers, ascending", given)
+    return float(ends[0]), float(ends[1])
+
+
+def _value(
+    certificate: Certificate, rates: Mapping[str, float], parameter: str | Mapping[str, float]
+) -> float:
+    """Return the value of the parameter at which a certificate was made."""
+    certificate.problem.check_parameters(rates)
+    if not isinstance(parameter, str):
+        return 0.0
+    (value,) = certificate.problem.parameter_values[parameter]
+    return float(value)
+
+
+def _system(
+    certificate: Certificate,
+    rates: Mapping[str, float],
+    interval: tuple[float, float],
+    parameter: str | Mapping[str, float],
+    symmetry: Symmetry,
+) -> System:
+    problem, (low, high) = certificate.problem, interval
+    if problem.is_sparse:
+        checks.refuse("certificate", "one of a small polyhedron", repr(certificate))
+    now = _value(certificate, rates, parameter)
+    if not low <= now <= high:
+        checks.refuse("interval", f"one that contains {now:g}, of the certificate", interval)
+    speeds = np.array([*rates.values()], dtype=np.float64)
+    values = np.array([next(iter(problem.parameter_values[name])) for name in rates])
+    whole, q = lifted_problem(problem, tuple(rates)), certificate.point
+    system = System(
+        problem=whole,
+        manifold=problem.polyhedron.manifold,
+        start=values + (low - now) * speeds,
+        rates=speeds * (high - low) / UNITS,
+        length=UNITS,
+        sizes=np.ones(whole.rows),
+        equations=tuple(independent_equations(problem.polyhedron, [q])),
+        symmetry=symmetry,
+        tolerances=certificate.tolerances,
+    )
+    known = system.at(q / problem.scales, (now - low) / (high - low) * UNITS)
+    sizes = np.linalg.norm(known.gradients, axis=1) + np.linalg.norm(known.hessians, axis=(1, 2))
+    return replace(system, sizes=np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0))
+
+
+def _start(
+    system: System,
+    certificate: Certificate,
+    rates: Mapping[str, float],
+    parameter: str | Mapping[str, float],
+    interval: tuple[float, float],
+) -> FritzJohn:
+    """Return the Fritz John point of a certificate."""
+    a, (low, high) = certificate.found, interval
+    if not a.independent or a.multipliers.residual > a.local.small:
+        expected = "a point stationary on its face, with independent active gradients"
+        checks.refuse("certificate", expected, repr(certificate))
+    functions = {f.name: row for row, f in enumerate(system.problem.functions)}
+    lam = np.zeros(system.problem.rows)
+    try:
+        for name, value in a.named_multipliers.items():
+            row = functions[name]
+            lam[row] = value * system.sizes[row]
+    except KeyError as error:
+        checks.refuse("certificate", "several of the same functions", str(error))
+    negative = [name for name in a.names if lam[functions[name]] < -a.local.small]
+    if negative:
+        expected = "an equilibrium: no active function with a negative multiplier"
+        checks.refuse(
+            "certificate", expected, f"{negative[0]} with {lam[functions[negative[0]]]:g}"
+        )
+    weak = {*a.weak}
+    lam[[*weak]] = 0.0
+    lam[-1] = system.sizes[-1]
+    s = (_value(certificate, rates, parameter) - low) / (high - low) * system.length
+    if not 0 <= s <= system.length:
+        checks.refuse("certificate", "values of the parameter in the interval", repr(certificate))
+    face = tuple(i for i in a.active if i not in weak)
+    u = certificate.point / system.manifold.scale_array
+    x = system.guess(face, u, s, lam / np.linalg.norm(lam))
+    found = corrected(system, face, x, np.eye(len(x))[system.n], math.inf)
+    if found is None:
+        expected = "an equilibrium that is isolated, modulo the symmetry, at its parameter"
+        checks.refuse("certificate", expected, repr(certificate))
+    return found
+
+
+def _key(points: Sequence[FritzJohn]) -> tuple[float, ...]:
+    """Return numbers by which arcs and events are listed: those of the parameter, then places."""
+    ends = sorted((points[0].s, points[-1].s))
+    places = np.concatenate([ends, points[len(points) // 2].u])
+    return tuple((np.round(places, 6) + 0.0).tolist())
+
+
+def _diagram(
+    search: _Search,
+    certificate: Certificate,
+    rates: Mapping[str, float],
+    parameter: str | Mapping[str, float],
+    interval: tuple[float, float],
+    closed: bool,
+) -> Diagram:
+    """Return arcs and events in terms of the user."""
+    system, names = search.system, [f.name for f in search.system.problem.functions]
+    low, unit = interval[0], (interval[1] - interval[0]) / search.system.length
+    # In an order that does not depend on the order in which they were found.
+    kept = sorted(
+        (k for k, edge in enumerate(search.edges) if edge.points),
+        key=lambda k: _key(search.edges[k].points),
+    )
+    shown = sorted(
+        (k for k, node in enumerate(search.nodes) if node.arms),
+        key=lambda k: _key([search.nodes[k].at]),
+    )
+    arc_of = {k: j for j, k in enumerate(kept)}
+    event_of = {k: j for j, k in enumerate(shown)}
+    arcs = []
+    for k in kept:
+        edge = search.edges[k]
+        points, ends = edge.points, edge.ends
+        if points[0].s > points[-1].s:
+            points, ends = points[::-1], ends[::-1]
+        rows = system.rows(edge.face)[:-1]
+        mu = np.array([p.mu for p in points])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lam = mu[:, rows] / mu[:, -1:] * system.sizes[-1] / system.sizes[rows]
+        stated = {names[row]: lam[:, j] for j, row in enumerate(rows)}
+        arcs.append(
+            Arc(
+                active=tuple(names[i] for i in edge.face),
+                parameters=np.array([low + p.s * unit for p in points]),
+                points=np.array([system.place(p.u) for p in points]),
+                multipliers=certificate.problem.stated(stated),
+                energies=np.array([p.known.values[-1] for p in points]) * system.sizes[-1],
+                index=int((points[len(points) // 2].curvatures() < 0).sum()),
+                events=(event_of.get(ends[0], -1), event_of.get(ends[1], -1)),
+            )
+        )
+    events = []
+    for k in shown:
+        node = search.nodes[k]
+        arms = sorted(node.arms, key=lambda arm: float(arm.direction[system.n]))
+        events.append(
+            BranchEvent(
+                kind=kind_of(node),
+                parameter=low + node.at.s * unit,
+                point=system.manifold.canonical(system.place(node.at.u)),
+                before=tuple(names[i] for i in arms[0].face),
+                after=tuple(names[i] for i in arms[-1].face),
+                functions=tuple(names[i] for i in node.weak),
+                arcs=tuple(arc_of[arm.arc] for arm in arms if arm.arc in arc_of),
+                note="; ".join(dict.fromkeys(node.notes)),
+            )
+        )
+    return Diagram(
+        problem=certificate.problem,
+        parameter=parameter if isinstance(parameter, str) else "change",
+        rates=rates,
+        value=_value(certificate, rates, parameter),
+        interval=interval,
+        arcs=tuple(arcs),
+        events=tuple(events),
+        closed=closed,
+    )

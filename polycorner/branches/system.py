@@ -1,0 +1,208 @@
+"""Fritz John points of an energy on the faces of a polyhedron that depends on a parameter.
+
+Let ``f_i(q, t) >= 0`` and ``h_j(q, t) = 0`` be the functions of the set and ``E(q, t)`` the energy.
+A point of the face ``A``, where the ``f_i`` of ``A`` and all ``h_j`` vanish, together with a ray of
+multipliers ``mu``, is a Fritz John point if
+
+==============================================  ===========================================
+``mu_0 dE - sum mu_i df_i = 0``                 the gradients by ``q`` are related
+``f_i = 0`` for ``i`` in ``A``, ``h_j = 0``     the point lies on the face
+``|mu| = 1``                                    one multiple of each relation
+==============================================  ===========================================
+
+It is stationary with ``dE/df_i = mu_i / mu_0`` where ``mu_0 > 0``.  For almost all functions the
+solutions ``(q, t, mu)`` are a curve for every face, also where the active gradients become
+dependent (``mu_0 = 0``) and where one function more vanishes than there are coordinates: then the
+point stays and ``mu`` moves.  On it lie the arcs with ``mu >= 0`` and all other ``f_i >= 0``; an
+arc ends where one of these vanishes, and there exactly one arc of another face begins
+([KojimaHirabayashi] sec. 4, [JJT]).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from polycorner.minimisation.problem import Problem
+from polycorner.polyhedra.cones import null_space, unit_rows
+from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.spaces.manifold import Array, Manifold
+from polycorner.tolerances import Tolerances
+
+Face = tuple[int, ...]  # positions of the inequalities that are held, in ascending order
+
+
+class Derivatives(NamedTuple):
+    """Values ``(M,)`` and derivatives of all rows by coordinates and the parameter."""
+
+    values: Array
+    gradients: Array
+    hessians: Array
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """The equations for all faces of a polyhedron with one parameter.
+
+    Attributes
+    ----------
+    problem : Problem
+        On the manifold of the coordinates, with the formulas' parameters as further coordinates.
+    manifold : Manifold
+        Of the coordinates alone.
+    start, rates : (p,) array
+        Values of the formulas' parameters at the start of the interval, and their derivatives by
+        ``s``.
+    length : float
+        Of the interval, in units of ``s``.
+    sizes : (M,) array
+        Sizes by which the functions and the energy are divided.
+    equations : tuple of int
+        Rows of the equations that imply the others nearby.
+    symmetry : Symmetry
+    tolerances : Tolerances
+    """
+
+    problem: Problem
+    manifold: Manifold
+    start: Array
+    rates: Array
+    length: float
+    sizes: Array
+    equations: tuple[int, ...]
+    symmetry: Symmetry
+    tolerances: Tolerances
+
+    @property
+    def n(self) -> int:
+        """The number of coordinates."""
+        return self.manifold.size
+
+    @property
+    def is_union(self) -> bool:
+        """Whether the polyhedron is a union of pieces."""
+        return self.problem.polyhedron.is_union
+
+    @property
+    def others(self) -> int:
+        """The number of equations."""
+        return self.problem.rows - self.problem.inequalities - 1
+
+    def place(self, u: Array) -> Array:
+        """Return coordinates, not wrapped."""
+        return u * self.manifold.scale_array
+
+    def values(self, s: float) -> Array:
+        """Return the values of the formulas' parameters."""
+        return self.start + s * self.rates
+
+    def at(self, u: Array, s: float) -> Derivatives:
+        """Return values and derivatives of all functions by ``(u, s)``, divided by the sizes."""
+        n, p = self.n, len(self.rates)
+        q = np.concatenate([self.place(u), self.values(s)])
+        values, gradients, hessians = self.problem.evaluate(q, 2)
+        onto = np.zeros((n + p, n + 1))
+        onto[:n, :n], onto[n:, n] = np.eye(n), self.rates
+        size = self.sizes[:, None]
+        return Derivatives(
+            values / self.sizes,
+            (gradients / size) @ onto,
+            onto.T @ (hessians / size[:, :, None]) @ onto,
+        )
+
+    def orbit(self, u: Array) -> Array:
+        """Return the scaled tangent vectors of the continuous symmetries, ``(g, n)``."""
+        if self.symmetry.tangents is None and not self.symmetry.fields:
+            return np.zeros((0, self.n))
+        return np.asarray(self.symmetry.directions(self.manifold, self.place(u)))
+
+    def rows(self, face: Face) -> list[int]:
+        """Return the rows that have multipliers on a face: its own, equations, the energy."""
+        return [*face, *self.equations, self.problem.rows - 1]
+
+    def guess(self, face: Face, u: Array, s: float, mu: Array) -> Array:
+        """Return the vector of unknowns ``(u, s, mu)`` on a face, of multipliers of all rows."""
+        return np.concatenate([u, [s], mu[self.rows(face)]])
+
+    def point(self, face: Face, x: Array) -> "FritzJohn":
+        """Return the residual and the derivatives of the equations at a guess."""
+        return FritzJohn(self, face, x)
+
+
+class FritzJohn:
+    """The equations of a face at a guess ``x = (u, s, mu)``.
+
+    Attributes
+    ----------
+    u, s, mu
+        The parts of the guess; ``mu`` are the multipliers of all rows.
+    left : (N,) array
+        The residual.
+    jacobian : (N, n + 1 + k) array
+        Its derivative, and the rows that keep a step across the orbit.
+    finite : bool
+        Whether all are.
+    """
+
+    def __init__(self, system: System, face: Face, x: Array) -> None:
+        self.system, self.face, self.x = system, face, x
+        n, rows = system.n, system.rows(face)
+        self.u, self.s, own = x[:n], float(x[n]), x[n + 1 :]
+        self.mu = np.zeros(system.problem.rows)
+        self.mu[rows] = own
+        self.known = system.at(self.u, self.s)
+        values, gradients, hessians = self.known
+        sign = np.where(np.arange(len(rows)) < len(rows) - 1, -1.0, 1.0)
+        slopes, k = sign[:, None] * gradients[rows, :n], len(rows) - 1
+        bent = np.einsum("i,ijk->jk", sign * own, hessians[rows])
+        self.curvature = bent[:n, :n]
+        self.orbit = unit_rows(system.orbit(self.u))
+        g = len(self.orbit)
+        self.left = np.concatenate(
+            [own @ slopes, values[rows[:-1]], [(own @ own - 1) / 2], np.zeros(g)]
+        )
+        J = np.zeros((n + k + 1 + g, n + 1 + len(rows)))
+        J[:n, : n + 1], J[:n, n + 1 :] = bent[:n], slopes.T
+        J[n : n + k, : n + 1] = gradients[rows[:-1]]
+        J[n + k, n + 1 :] = own
+        J[n + k + 1 :, :n] = self.orbit
+        self.jacobian = J
+        self.finite = bool(np.isfinite(J).all() and np.isfinite(self.left).all())
+
+    def kernel(self) -> tuple[Array, Array]:
+        """Return singular values ``(N,)``, ascending, and their vectors, of the Jacobian."""
+        _, values, vectors = np.linalg.svd(self.jacobian)
+        extra = len(vectors) - len(values)
+        values = np.concatenate([values, np.zeros(max(extra, 0))])
+        return values[::-1], vectors[::-1]
+
+    def tangent(self, like: Array | None = None) -> Array:
+        """Return the unit vector along the curve, on the side of ``like``."""
+        t = self.kernel()[1][0]
+        return np.asarray(-t if like is not None and t @ like < 0 else t)
+
+    def curvatures(self) -> Array:
+        """Return eigenvalues of the Lagrangian's Hessian along the face, ascending."""
+        n, rows = self.system.n, self.system.rows(self.face)[:-1]
+        held = np.vstack([self.known.gradients[rows, :n], self.orbit])
+        basis = null_space(unit_rows(held), self.system.tolerances.rank)
+        return np.asarray(np.linalg.eigvalsh(basis.T @ self.curvature @ basis))
+
+    def watched(self) -> tuple[Array, Array]:
+        """Return what must not be negative along an arc ``(m + 3,)``, and its derivatives by x.
+
+        These are, row by row, the values of the open inequalities and the multipliers of the held
+        ones; the multiplier of the energy; and the parameter's distances from both ends.
+        """
+        system, n = self.system, self.system.n
+        m, face = system.problem.inequalities, list(self.face)
+        values = np.concatenate(
+            [self.known.values[:m], self.x[-1:], [self.s, system.length - self.s]]
+        )
+        values[face] = self.mu[face]
+        slopes = np.zeros((m + 3, len(self.x)))
+        slopes[:m, : n + 1] = self.known.gradients[:m]
+        slopes[face] = 0.0
+        slopes[face, n + 1 + np.arange(len(face))] = 1.0
+        slopes[m, -1], slopes[m + 1, n], slopes[m + 2, n] = 1.0, 1.0, -1.0
+        return values, slopes
