@@ -323,7 +323,7 @@ def between(
     return HullContacts(
         [(made[one.name], made[two.name]) for one, two in sharp],
         (pair[0].manifold.size, pair[1].manifold.size),
-        (OPTIONS.parting * scale, OPTIONS.touching * scale),
+        (OPTIONS.overlap * scale, OPTIONS.touching * scale),
         (*pair[0].manifold.names, *pair[1].manifold.names),
         lattice.lengths.tolist(),
         reach,
@@ -353,7 +353,7 @@ def listed_hulls(one: PlacedPart, two: PlacedPart, scale: float) -> HullContacts
     return HullContacts(
         [(_hull(one.name, one.part), _hull(two.name, two.part))],
         (len(one.coordinates), len(two.coordinates)),
-        (OPTIONS.parting * scale, OPTIONS.touching * scale),
+        (OPTIONS.overlap * scale, OPTIONS.touching * scale),
         (*one.coordinates, *two.coordinates),
     )
 

@@ -23,7 +23,7 @@ def view_motion(file: Path, out: Path | None) -> None:
 
         poses = _loaded(file, saved_poses)
         _written(path, lambda: (
-            film_of(poses, title=file.stem).save(path) if path.suffix.lower() in FILMS
+            film_of(poses, title=file.stem).save(Path(path)) if path.suffix.lower() in FILMS
             else write_poses(poses, path)
         ))  # fmt: skip
     _told(path, out)

@@ -95,7 +95,7 @@ def trajectory_dataset(
         about = {"long_name": f"velocities, per {motion.time}"} | each
         data[f"q{end}"] = dimensions, q, {"long_name": "coordinates, not wrapped"} | each
         data[f"v{end}"] = dimensions, v, about
-        over, values = ("time", f"body{end}", f"gap{end}"), kind.polyhedron.values(q)
+        over, values = ("time", f"body{end}", f"gap{end}"), _gaps(kind, q)
         data[f"gaps{end}"] = column(over, values, every["gap"], "gaps of the contacts")
         places |= {over[1]: np.arange(q.shape[1]), over[2]: list(kind.contacts)}
         places[dimensions[2]] = list(kind.manifold.names)
@@ -365,3 +365,11 @@ def _read(content: "xr.Dataset", system: System | Assembly) -> "str | Trajectory
             forms.array("q", array, "f", shape)
     joined = [np.concatenate([a.reshape(len(a), -1) for a in every], axis=1) for every in (q, v)]
     return read_motion(content, system, *joined)
+
+
+def _gaps(system: System, q: Any) -> Any:
+    """Return the gaps of all contacts at places of a body, or of several of a kind."""
+    rows, names = q.reshape(-1, q.shape[-1]), system.manifold.names
+    further = [hulls.values(names, rows) for hulls in system.hulls]
+    gaps = [system.polyhedron.values(q), *(f.reshape(*q.shape[:-1], -1) for f in further)]
+    return np.concatenate(gaps, axis=-1)

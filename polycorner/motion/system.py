@@ -390,13 +390,14 @@ class System(MechanicalSystem, Printed):
     def _check_hulls(self, q: Array) -> None:
         deep = -OPTIONS.overlap * min(self.manifold.scales)
         for hulls in self.hulls:
-            for i, x in enumerate(q.reshape(-1, self.manifold.size)):
-                gap, name = hulls.least(self.manifold.names, x)
-                if gap < deep:
-                    who = self._who(name, i)
-                    at = "" if repr(name) in who else f" at contact {name!r}"
-                    msg = f"q: expected a placement without overlap; {who} by {-gap:.6g}{at}"
-                    raise ValueError(msg)
+            gaps = hulls.values(self.manifold.names, q.reshape(-1, self.manifold.size))
+            i, g = np.unravel_index(int(gaps.argmin()), gaps.shape)
+            if (least := gaps[i, g]) < deep:
+                name = hulls.names[g]
+                who = self._who(name, int(i))
+                at = "" if repr(name) in who else f" at contact {name!r}"
+                msg = f"q: expected a placement without overlap; {who} by {-least:.6g}{at}"
+                raise ValueError(msg)
 
     def sticks(self, q: Array, v: Array, time: float = 0.0) -> NDArray[np.bool_]:
         """Return for each friction contact whether its slip is zero, ``(..., F)``.

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from itertools import starmap, zip_longest
 from typing import TYPE_CHECKING
 
@@ -257,8 +258,8 @@ class Trajectory(Checked, Printed):
         0.95
         """
         # The one way up: people look for the method here, and the dataset is that of files.
-        from polycorner.files.trajectories import trajectory_dataset
-
+        # By name: files know of trajectories.
+        trajectory_dataset = import_module("polycorner.files.trajectories").trajectory_dataset
         return trajectory_dataset(self, units=units)
 
     @checked

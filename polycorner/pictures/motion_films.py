@@ -242,7 +242,7 @@ def film(
     poses = poses_of(arrangement, motion)
     made = film_of(poses, fps=fps, speed=speed, size=size, contacts=contacts, title=title)
     if path is not None:
-        made.save(path)
+        made.save(Path(path))
     return made
 
 

@@ -1,5 +1,7 @@
 """Motion of sharp polygons and polyhedra, against what is known or computed in another way."""
 
+import signal
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -19,7 +21,8 @@ from polycorner.bodies import (
     polytope,
     sphere,
 )
-from polycorner.motion import Consistency, Solver, accelerations
+from polycorner.files import load_trajectory, save_trajectory
+from polycorner.motion import Checkpoint, Consistency, Solver, accelerations
 from tests.support.boxes import brick, can_stand, deepest, loads, voussoir
 
 G = 10.0
@@ -107,7 +110,9 @@ def test_a_block_slides_over_the_seam_of_two_others(d):
     v[2, 0] = 1.0
     path = simulate(system, system.state(start, v), 0.9, 1e-3)
     assert path.v[:, 2, 0] == pytest.approx(np.ones(len(path.v)), abs=1e-4)
-    assert path.q[:, 2, d - 1] == pytest.approx(np.full(len(path.q), 1.5), abs=1e-4)
+    # In space it hops a little where corners pass corners, all at once.
+    hop = 1e-6 if d == 2 else 1e-3
+    assert path.q[:, 2, d - 1] == pytest.approx(np.full(len(path.q), 1.5), abs=hop)
 
 
 def test_bars_across_each_other_press_where_edges_cross():
@@ -423,6 +428,40 @@ def test_threads_change_no_bit():
     start = system.state(path.q[0], path.v[0])
     one, two = (simulate(system, start, 0.5, 2e-3, solver=Solver(threads=n)).q for n in (1, 2))
     assert np.array_equal(one, two)
+
+
+def falling(restitution=0.0):
+    """Two bricks, one repeated and both listed, and where one falls on the other."""
+    body = brick(1.0, 0.5)
+    a, repeated = on_the_floor(body, 2, friction=0.4, restitution=restitution)
+    two = Arrangement({"A1": body, "A2": body}, a.walls, orientations="all")
+    listed = two.system(gravity=[0, -G], friction=0.4, restitution=restitution)
+    start = np.array([[0, 0.25, 0], [0.4, 1.2, 0.3]])
+    return (repeated, start), (listed, start.ravel())
+
+
+def test_motions_of_sharp_bodies_are_saved_read_and_resumed(tmp_path):
+    """The state alone decides which plane is chosen: a run that was stopped ends as another."""
+    others = falling(restitution=0.1)
+    for k, ((system, q), (other, _)) in enumerate(zip(falling(), others, strict=True)):
+        whole = simulate(system, system.state(q), 0.4, 1e-3, every=50)
+        file = save_trajectory(whole, tmp_path / f"{k}.nc")
+        assert np.array_equal(load_trajectory(file, system).q, whole.q)
+        with pytest.raises(ValueError, match=r"restitution|hulls|between"):
+            load_trajectory(file, other)
+        saved = Checkpoint(tmp_path / f"run {k}", seconds=0.0)
+
+        pressed = []
+
+        def stop(done, *_, pressed=pressed):
+            if done > 0.2 and not pressed:
+                pressed.append(signal.raise_signal(signal.SIGINT))
+
+        options = {"every": 50, "checkpoint": saved}
+        part = simulate(system, system.state(q), 0.4, 1e-3, progress=stop, **options)
+        assert not part.finished
+        again = simulate(system, system.state(q), 0.4, 1e-3, **options)
+        assert np.array_equal(again.q, whole.q)
 
 
 def many_sided(count):

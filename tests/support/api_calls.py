@@ -78,6 +78,7 @@ VALUES = {
     "CriticalSearch": lambda: of.disks().critical_search(0, starts=3),
     "Diagram": lambda: branches.branches(of.certificate(), "a", (0.5, 1.5)),
     "Arc": lambda: branches.branches(of.certificate(), "a", (0.5, 1.5)).arcs[0],
+    "BranchEvent": lambda: branches.branches(of.certificate(), "a", (0.5, 1.5)).events[0],
     "Crossing": lambda: minimisation.crossing(of.certificate(), "left", "a"),
     "CutDisc": lambda: motion.CutDisc(0.3, 0.1),
     "Cylinder": lambda: bodies.Cylinder(3.0),
@@ -236,7 +237,9 @@ CALLS = {
         "parameter": "a",
         "interval": (0.5, 1.5),
     },
+    "Arc.at": lambda: {"value": 1.0},
     "Diagram.at": lambda: {"value": 1.0},
+    "Diagram.problem_at": lambda: {"value": 1.0},
     "minimisation.crossing": lambda: {
         "certificate": of.certificate(),
         "contact": "left",

@@ -215,12 +215,11 @@ class HullContacts(Value):
         rows = tuple(range(first, first + len(some)))
         return Call(family, reads, np.array(self.table), rows, some)  # type: ignore[arg-type]
 
-    def least(self, names: Sequence[str], q: Array) -> tuple[float, str]:
-        """Return the least gap at the coordinates of a system, and its contact."""
+    def values(self, names: Sequence[str], q: Array) -> Array:
+        """Return the gaps ``(N, m)`` at coordinates ``(N, n)`` of a system."""
         call = self.gaps_of(names, 0)
-        at = q[list(call.reads)]
-        values = call.family.kernel.at(at, call.parameters.ctypes.data, 0)[0]
-        return float(values.min()), self.names[int(values.argmin())]
+        kernel, numbers = call.family.kernel, call.parameters.ctypes.data
+        return np.array([kernel.at(x, numbers, 0)[0] for x in q[:, call.reads]])
 
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""

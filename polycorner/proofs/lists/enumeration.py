@@ -27,7 +27,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from polycorner import checks
-from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.ranges import LARGEST
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.balls import ball, precision
@@ -36,7 +35,6 @@ from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
 from polycorner.minimisation.parametric import lifted_problem
 from polycorner.minimisation.problem import Problem, pose
-from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.progress import Progress, silent
@@ -50,7 +48,7 @@ from polycorner.proofs.lists.search import BoxSearch, StationarySearch
 from polycorner.proofs.lists.stationary import StationaryList
 from polycorner.proofs.lists.stores import SearchStore
 from polycorner.proofs.parameter_boxes import check_parameters
-from polycorner.spaces.manifold import Array, Manifold
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, SEARCH
 
 if TYPE_CHECKING:
