@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class Written(str):
+class Legible(str):
     """A text that is shown without quotation marks."""
 
     __slots__ = ()
@@ -50,7 +50,7 @@ def readable(given: Signature) -> Signature:
     parameters = [
         p.replace(
             annotation=_annotation(p.annotation),
-            default=Written(p.default.__name__) if _is_function(p.default) else p.default,
+            default=Legible(p.default.__name__) if _is_function(p.default) else p.default,
         )
         for p in given.parameters.values()
     ]
@@ -63,7 +63,7 @@ def _is_function(value: object) -> bool:
 
 
 def _annotation(given: Any) -> Any:
-    return given if given is Parameter.empty else Written(written(given))
+    return given if given is Parameter.empty else Legible(written(given))
 
 
 def written(annotation: Any) -> str:

@@ -393,6 +393,8 @@ class Arrangement(Checked, Printed):
         [[2.0, 0.0, -2.0]]
         """
         if isinstance(count, Mapping):
+            if self.joints or drives or forces:
+                refuse("count", "1 for bodies with joints, drives or forces of their own", count)
             check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
             alone = {p: self._alone(p) for p in self.placements}
             given = {"friction": friction, "rolling": rolling, "restitution": restitution}

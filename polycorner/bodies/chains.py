@@ -49,7 +49,7 @@ def clean(values: Array) -> Array:
     return np.where(abs(values - near) <= DEFAULT.rounding, near, values)
 
 
-class Step(NamedTuple):
+class LinkStep(NamedTuple):
     """How a joint, or nothing but free coordinates, place a link in the axes of the one before.
 
     Attributes
@@ -140,11 +140,11 @@ class Chain:
 
     Attributes
     ----------
-    steps : tuple of (Step, bool)
+    steps : tuple of (LinkStep, bool)
         From the other link to this one, and which of them are taken backwards.
     """
 
-    steps: tuple[tuple[Step, bool], ...]
+    steps: tuple[tuple[LinkStep, bool], ...]
 
     @property
     def reads(self) -> tuple[str, ...]:
@@ -289,7 +289,7 @@ def still() -> Moving:
     return Moving(sympy.eye(3).tolist(), zero, zero, zero)
 
 
-def moved(before: Moving, step: Step, rates: "Mapping[str, sympy.Symbol]") -> Moving:
+def moved(before: Moving, step: LinkStep, rates: "Mapping[str, sympy.Symbol]") -> Moving:
     """Return the motion of a link, of that of the link before and of its joint.
 
     Formulas of one link contain those of the one before; what compiles them visits each once.

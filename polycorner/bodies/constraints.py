@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from polycorner import checks
-from polycorner.bodies.holds import Angle, Coordinate, Hold, Position, across, hamilton, times
+from polycorner.bodies.holds import Angle, Coordinate, Holding, Position, across, hamilton, times
 from polycorner.bodies.joints import AnyJoint, Ball, Fixed, Gear, Hinge, Joint, Planar, Rail, Slider
 from polycorner.bodies.shapes import Body, turning
 from polycorner.checks import about, refuse
@@ -92,14 +92,14 @@ def _axis(joint: Joint) -> Array:
 # ------------------------------------------------------------------------------------ equations
 
 
-def away(joint: Joint, one: Hold, two: Hold) -> "Point":
+def away(joint: Joint, one: Holding, two: Holding) -> "Point":
     """Return the way ``w`` from the parent's anchor to the child's, in the axes of space."""
     at, on = anchors(joint, two.dimension)
     x, y, z = (q - p for p, q in zip(one.point(at), two.point(on), strict=True))
     return x, y, z
 
 
-def _turned(joint: Joint, one: Hold, two: Hold) -> "tuple[Any, ...]":
+def _turned(joint: Joint, one: Holding, two: Holding) -> "tuple[Any, ...]":
     """Return the quaternion ``X``."""
     w, x, y, z = one.quaternion
     u, *back = Rotation.from_matrix(_reference(joint, 3)).as_quat()[[3, 0, 1, 2]].tolist()
@@ -107,7 +107,7 @@ def _turned(joint: Joint, one: Hold, two: Hold) -> "tuple[Any, ...]":
     return hamilton(turned, (u, *(-v for v in back)))
 
 
-def _angle(joint: Joint, one: Hold, two: Hold) -> Angle:
+def _angle(joint: Joint, one: Holding, two: Holding) -> Angle:
     """Return the angle about the axis, in the plane counterclockwise."""
     import sympy
 
@@ -123,12 +123,12 @@ def _along(axis: Array, vector: "Sequence[sympy.Expr]") -> "sympy.Expr":
     return sum(n * v for n, v in zip(axis.tolist(), vector, strict=True))
 
 
-def _meeting(joint: Joint, one: Hold, two: Hold) -> "Expressions":
+def _meeting(joint: Joint, one: Holding, two: Holding) -> "Expressions":
     """Return the equations of anchors that come together."""
     return dict(zip("xyz"[: two.dimension], away(joint, one, two), strict=False))
 
 
-def _unturned(joint: Joint, one: Hold, two: Hold, axes: Sequence[Array]) -> "Expressions":
+def _unturned(joint: Joint, one: Holding, two: Holding, axes: Sequence[Array]) -> "Expressions":
     """Return the equations of no rotation about some axes; in the plane there is one."""
     if two.dimension == 2:
         return {"turn": 2 * _angle(joint, one, two).sine}
@@ -136,7 +136,7 @@ def _unturned(joint: Joint, one: Hold, two: Hold, axes: Sequence[Array]) -> "Exp
     return {f"turn{k}": 2 * _along(axis, vector) for k, axis in enumerate(axes, 1)}
 
 
-def _beside(joint: Joint, one: Hold, two: Hold, ways: Sequence[Array]) -> "Expressions":
+def _beside(joint: Joint, one: Holding, two: Holding, ways: Sequence[Array]) -> "Expressions":
     """Return the equations of no displacement along some directions of the parent."""
     displaced = away(joint, one, two)
     marks = [""] if len(ways) == 1 else map(str, range(1, len(ways) + 1))
@@ -144,39 +144,39 @@ def _beside(joint: Joint, one: Hold, two: Hold, ways: Sequence[Array]) -> "Expre
 
 
 @singledispatch
-def equations(joint: Joint, one: Hold, two: Hold) -> "Expressions":
+def equations(joint: Joint, one: Holding, two: Holding) -> "Expressions":
     """Return the equations of a joint by the ends of their names; of a ball: anchors together."""
     return _meeting(joint, one, two)
 
 
 @equations.register(Hinge)
-def _(joint: Hinge, one: Hold, two: Hold) -> "Expressions":
+def _(joint: Hinge, one: Holding, two: Holding) -> "Expressions":
     """Anchors together; in space no rotation about two directions across the axis."""
     found = _meeting(joint, one, two)
     return found if two.dimension == 2 else found | _across(joint, one, two)
 
 
 @equations.register(Slider)
-def _(joint: Slider, one: Hold, two: Hold) -> "Expressions":
+def _(joint: Slider, one: Holding, two: Holding) -> "Expressions":
     """No displacement across the axis, and no rotation."""
     held = _unturned(joint, one, two, [*np.eye(3)])
     return _beside(joint, one, two, across(_axis(joint))) | held
 
 
 @equations.register(Planar)
-def _(joint: Planar, one: Hold, two: Hold) -> "Expressions":
+def _(joint: Planar, one: Holding, two: Holding) -> "Expressions":
     """No displacement along the axis, and no rotation about two directions across it."""
     return _beside(joint, one, two, [_axis(joint)]) | _across(joint, one, two)
 
 
 @equations.register(Fixed)
-def _(joint: Fixed, one: Hold, two: Hold) -> "Expressions":
+def _(joint: Fixed, one: Holding, two: Holding) -> "Expressions":
     """Anchors together, and no rotation."""
     return _meeting(joint, one, two) | _unturned(joint, one, two, [*np.eye(3)])
 
 
 @equations.register(Rail)
-def _(joint: Rail, one: Hold, two: Hold) -> "Expressions":
+def _(joint: Rail, one: Holding, two: Holding) -> "Expressions":
     """No displacement across the line; or the anchor on the curve, in its plane."""
     if joint.curve is None:
         return _beside(joint, one, two, across(_axis(joint)))
@@ -189,7 +189,7 @@ def _(joint: Rail, one: Hold, two: Hold) -> "Expressions":
     return found
 
 
-def _across(joint: Joint, one: Hold, two: Hold) -> "Expressions":
+def _across(joint: Joint, one: Holding, two: Holding) -> "Expressions":
     return _unturned(joint, one, two, across(_axis(joint)))
 
 
@@ -202,7 +202,7 @@ def has_coordinate(joint: AnyJoint) -> bool:
     return straight or isinstance(joint, Hinge | Slider)
 
 
-def coordinate(joint: Joint, one: Hold, two: Hold) -> Coordinate:
+def coordinate(joint: Joint, one: Holding, two: Holding) -> Coordinate:
     """Return the angle or the position that a joint leaves."""
     if isinstance(joint, Hinge):
         return _angle(joint, one, two)

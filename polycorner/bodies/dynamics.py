@@ -13,7 +13,7 @@ from polycorner import checks
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice
-from polycorner.bodies.laws import Both, Laws
+from polycorner.bodies.laws import Both, ContactLaws
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.neighbours import Pair, pairs
 from polycorner.bodies.pairs import PlacedPart, Touch, both_sharp, distances
@@ -276,7 +276,7 @@ def touching_twins(
 
 
 def between(
-    placements: tuple[Placement, Placement], lattice: Lattice, known: Laws
+    placements: tuple[Placement, Placement], lattice: Lattice, known: ContactLaws
 ) -> ContactFamily | HullContacts:
     """Return the contacts of any two bodies like two given ones, by the laws of this pair.
 
@@ -359,7 +359,7 @@ def listed_hulls(one: PlacedPart, two: PlacedPart, scale: float) -> HullContacts
 
 
 def rubbing_hulls(
-    contacts: HullContacts, one: PlacedPart, two: PlacedPart, known: Laws
+    contacts: HullContacts, one: PlacedPart, two: PlacedPart, known: ContactLaws
 ) -> HullContacts:
     """Return contacts of two sharp parts with friction by the laws of each."""
     d, rubbing = one.part.dimension, {}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Quaternion = tuple[sympy.Expr, sympy.Expr, sympy.Expr, sympy.Expr]
 
 
-class Hold(NamedTuple):
+class Holding(NamedTuple):
     """What a joint takes hold of: a body, or space, in whose coordinates fixed bodies are."""
 
     name: str

@@ -48,7 +48,7 @@ class Meeting(NamedTuple):
     repeated: bool = False
 
 
-class Laws(NamedTuple):
+class ContactLaws(NamedTuple):
     """Coefficients by the name of the contact; those of contacts without any are left out."""
 
     friction: dict[str, Both]
@@ -62,7 +62,7 @@ def laws_of(
     restitution: Restitution,
     meetings: Sequence[Meeting],
     moving: Iterable[str],
-) -> Laws:
+) -> ContactLaws:
     """Return the coefficients of all contacts; ``moving`` are the bodies or kinds that move.
 
     Raises
@@ -74,7 +74,7 @@ def laws_of(
     moving = frozenset(moving)
     bounces = partial(checks.real, "restitution", least=0, most=1)
     rubs, rolls = (partial(static_and_dynamic, name) for name in ("friction", "rolling"))
-    return Laws(
+    return ContactLaws(
         _by_contact("friction", friction, meetings, moving, rubs),
         _by_contact("rolling", rolling, meetings, moving, rolls),
         _by_contact("restitution", restitution, meetings, moving, bounces),

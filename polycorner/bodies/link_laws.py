@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.bodies.chains import Moving, Step, clean, crossed, dot, times, transposed
+from polycorner.bodies.chains import LinkStep, Moving, clean, crossed, dot, times, transposed
 from polycorner.bodies.links import RobotJoint
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.rigid_motions import number, spin
@@ -87,7 +87,7 @@ def kinetic(motion: Moving, mass: Mass) -> "sympy.Expr":
     return (number(mass.mass) * sum(v**2 for v in speed) + turning) / 2
 
 
-def along_norm(step: Step, masses: Sequence[Mass], rates: Rates) -> "sympy.Expr":
+def along_norm(step: LinkStep, masses: Sequence[Mass], rates: Rates) -> "sympy.Expr":
     """Return what makes the masses of a quaternion regular, zero where it keeps its length."""
     import sympy
 

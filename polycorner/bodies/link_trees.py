@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from polycorner import checks
-from polycorner.bodies.chains import Chain, Pose, Step, clean
+from polycorner.bodies.chains import Chain, LinkStep, Pose, clean
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.links import RobotJoint
 from polycorner.checks import refuse
@@ -94,11 +94,11 @@ class LinkTree(Value):
         return found
 
     @cached_property
-    def steps(self) -> dict[str, tuple[str, Step]]:
+    def steps(self) -> dict[str, tuple[str, LinkStep]]:
         """For each carrier the one before it, and how it is placed there."""
-        found: dict[str, tuple[str, Step]] = {}
+        found: dict[str, tuple[str, LinkStep]] = {}
         if self.floats:
-            found[self.root] = (WORLD, Step("free", Frame.ROTATED.variables(self.root, 3)))
+            found[self.root] = (WORLD, LinkStep("free", Frame.ROTATED.variables(self.root, 3)))
         for name in self.order:
             joint = self.joints[name]
             if not joint.moves:
@@ -106,7 +106,7 @@ class LinkTree(Value):
             carrier, matrix, origin = self.rests[joint.parent]
             at, turn = origin + matrix @ joint.origin, clean(matrix @ joint.turn)
             other, rate, offset = joint.driven_by(name)
-            step = Step(
+            step = LinkStep(
                 "slide" if joint.kind == "prismatic" else "turn",
                 (other,),
                 tuple(at.tolist()),
@@ -118,7 +118,7 @@ class LinkTree(Value):
             found[joint.child] = (carrier, step)
         for name, frame in self.loose.items():
             kind = "free" if frame is Frame.ROTATED else "shift"
-            found[name] = (WORLD, Step(kind, frame.variables(name, 3)))
+            found[name] = (WORLD, LinkStep(kind, frame.variables(name, 3)))
         return found
 
     @cached_property

@@ -12,7 +12,7 @@ from polycorner import checks
 from polycorner.bodies import constraints
 from polycorner.bodies.constraints import check_fit, geared, has_coordinate, inequalities, relative
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.holds import Coordinate, Hold
+from polycorner.bodies.holds import Coordinate, Holding
 from polycorner.bodies.joints import WORLD, AnyJoint, Gear, Joint
 from polycorner.bodies.poses import Placement, pose_of
 from polycorner.bodies.shapes import Body
@@ -64,14 +64,14 @@ class Mechanism(Checked):
     joints: Mapping[str, AnyJoint]
     placements: tuple[Placement, ...]
 
-    def hold(self, name: str) -> Hold:
+    def hold(self, name: str) -> Holding:
         """Return what joints take hold of by a name; that of no body that moves is space."""
         d = self.placements[0].body.dimension
         found = (p for p in self.placements if p.name == name)
-        bodies = (Hold(name, p.frame, d, p.body.axis) for p in found)
-        return next(bodies, Hold(name, Frame.FIXED, d, None))
+        bodies = (Holding(name, p.frame, d, p.body.axis) for p in found)
+        return next(bodies, Holding(name, Frame.FIXED, d, None))
 
-    def sides(self, joint: Joint) -> tuple[Hold, Hold]:
+    def sides(self, joint: Joint) -> tuple[Holding, Holding]:
         """Return what a joint takes hold of."""
         return self.hold(joint.parent), self.hold(joint.child)
 

@@ -11,7 +11,7 @@ from enum import Enum
 
 import numpy as np
 
-from polycorner.branches.system import Face, FritzJohn, System
+from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.skeletons.sign_changes import may_vanish, sign_change
 from polycorner.spaces.manifold import Array
@@ -31,7 +31,7 @@ class Stop(Enum):
 
 
 @dataclass(frozen=True)
-class Way:
+class Course:
     """A part of a curve of Fritz John points.
 
     Attributes
@@ -54,7 +54,7 @@ class Way:
 
 
 def corrected(
-    system: System, face: Face, x: Array, across: Array, reach: float
+    system: FritzJohnSystem, face: Face, x: Array, across: Array, reach: float
 ) -> FritzJohn | None:
     """Return the point of the curve in the plane through ``x`` across a direction, or None."""
     at, start, last = system.point(face, x), x, math.inf
@@ -89,7 +89,7 @@ def polished(at: FritzJohn, j: int) -> FritzJohn | None:
     return None
 
 
-class _Follower:
+class _Continuation:
     def __init__(
         self, start: FritzJohn, direction: Array, options: WalkOptions, extent: float, most: int
     ) -> None:
@@ -102,7 +102,7 @@ class _Follower:
         side = np.where(abs(values) <= self.system.tolerances.zero, slopes @ direction, values)
         self.signs = np.where(side < 0, -1.0, 1.0) if self.system.is_union else np.ones(len(side))
 
-    def run(self) -> Way:
+    def run(self) -> Course:
         """Step to the first event."""
         h = self.options.first_step
         while True:
@@ -131,8 +131,8 @@ class _Follower:
             h = min(1.6 * h, self.options.longest_step)
             h = min(h, 0.8 * self.options.turn / max(float(np.linalg.norm(self.bend)), 1e-3))
 
-    def _way(self, stop: Stop) -> Way:
-        return Way(self.points, self.t, stop)
+    def _way(self, stop: Stop) -> Course:
+        return Course(self.points, self.t, stop)
 
     def _move(self, point: FritzJohn, t: Array) -> None:
         chord = self._chord(point)
@@ -262,7 +262,7 @@ def follow(
     *,
     extent: float = math.inf,
     most: int = 2000,
-) -> Way:
+) -> Course:
     """Follow the curve of Fritz John points through a point to the first event.
 
     Parameters
@@ -276,4 +276,4 @@ def follow(
     most : int, optional
         Steps, at most.
     """
-    return _Follower(start, direction, options, extent, most).run()
+    return _Continuation(start, direction, options, extent, most).run()

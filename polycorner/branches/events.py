@@ -25,7 +25,7 @@ from itertools import chain, combinations
 
 import numpy as np
 
-from polycorner.branches.continuation import Stop, Way
+from polycorner.branches.continuation import Course, Stop
 from polycorner.branches.diagram import BranchKind
 from polycorner.branches.system import Face, FritzJohn
 from polycorner.polyhedra.cones import null_space, unit_rows
@@ -62,7 +62,7 @@ class Node:
         return not self.notes and self.kind is not BranchKind.UNDECIDED
 
 
-def event_at_end(way: Way) -> Node:
+def event_at_end(way: Course) -> Node:
     """Return the event at the end of a part of a curve."""
     at = way.last
     if way.stop is Stop.FAR:

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from polycorner import checks
-from polycorner.branches.continuation import Stop, Way, corrected, follow
+from polycorner.branches.continuation import Course, Stop, corrected, follow
 from polycorner.branches.diagram import Arc, BranchEvent, Diagram
 from polycorner.branches.events import (
     TOLD,
@@ -18,7 +18,7 @@ from polycorner.branches.events import (
     kind_of,
     weak_event,
 )
-from polycorner.branches.system import Face, FritzJohn, System
+from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
 from polycorner.kinds import checked
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.parametric import lifted_problem
@@ -40,8 +40,8 @@ class _Edge:
     ends: list[int]
 
 
-class _Search:
-    def __init__(self, system: System, options: WalkOptions, extent: float) -> None:
+class _BranchSearch:
+    def __init__(self, system: FritzJohnSystem, options: WalkOptions, extent: float) -> None:
         self.system, self.options, self.extent = system, options, extent
         self.nodes: list[Node] = []
         self.edges: list[_Edge] = []
@@ -79,7 +79,7 @@ class _Search:
         waiting = sum(arm.arc < 0 for node in self.nodes for arm in node.arms)
         return len(self.edges), len(self.edges) + waiting, "arcs"
 
-    def _follow(self, at: FritzJohn, direction: np.ndarray) -> Way:
+    def _follow(self, at: FritzJohn, direction: np.ndarray) -> Course:
         return follow(at, direction, self.options, extent=self.extent)
 
     def _leave(self, k: int, arm: Arm) -> None:
@@ -91,7 +91,7 @@ class _Search:
         self.edges.append(_Edge(arm.face, way.points, [k, -1]))
         self._arrive(way, arm.arc, 1)
 
-    def _arrive(self, way: Way, edge: int, end: int) -> None:
+    def _arrive(self, way: Course, edge: int, end: int) -> None:
         """Register the end of an arc at an event, a new one or one that is known."""
         at, back = way.last, -way.tangent
         k = self._known(at)
@@ -253,7 +253,7 @@ def branches(  # noqa: PLR0913 - keywords of one search
     checks.whole("max_arcs", max_arcs, least=1)
     rates = {parameter: 1.0} if isinstance(parameter, str) else dict(parameter)
     system = _system(several[0], rates, (low, high), parameter, symmetry or Symmetry())
-    search = _Search(system, options or WalkOptions(), extent)
+    search = _BranchSearch(system, options or WalkOptions(), extent)
     for one in several:
         at = _start(system, one, rates, parameter, (low, high))
         search.begin_at_event(at) if one.found.weak else search.begin(at)
@@ -287,7 +287,7 @@ def _system(
     interval: tuple[float, float],
     parameter: str | Mapping[str, float],
     symmetry: Symmetry,
-) -> System:
+) -> FritzJohnSystem:
     problem, (low, high) = certificate.problem, interval
     if problem.is_sparse:
         checks.refuse("certificate", "one of a small polyhedron", repr(certificate))
@@ -297,7 +297,7 @@ def _system(
     speeds = np.array([*rates.values()], dtype=np.float64)
     values = np.array([next(iter(problem.parameter_values[name])) for name in rates])
     whole, q = lifted_problem(problem, tuple(rates)), certificate.point
-    system = System(
+    system = FritzJohnSystem(
         problem=whole,
         manifold=problem.polyhedron.manifold,
         start=values + (low - now) * speeds,
@@ -314,7 +314,7 @@ def _system(
 
 
 def _start(
-    system: System,
+    system: FritzJohnSystem,
     certificate: Certificate,
     rates: Mapping[str, float],
     parameter: str | Mapping[str, float],
@@ -363,7 +363,7 @@ def _key(points: Sequence[FritzJohn]) -> tuple[float, ...]:
 
 
 def _diagram(
-    search: _Search,
+    search: _BranchSearch,
     certificate: Certificate,
     rates: Mapping[str, float],
     parameter: str | Mapping[str, float],

@@ -41,7 +41,7 @@ class Derivatives(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class FritzJohnSystem:
     """The equations for all faces of a polyhedron with one parameter.
 
     Attributes
@@ -144,7 +144,7 @@ class FritzJohn:
         Whether all are.
     """
 
-    def __init__(self, system: System, face: Face, x: Array) -> None:
+    def __init__(self, system: FritzJohnSystem, face: Face, x: Array) -> None:
         self.system, self.face, self.x = system, face, x
         n, rows = system.n, system.rows(face)
         self.u, self.s, own = x[:n], float(x[n]), x[n + 1 :]

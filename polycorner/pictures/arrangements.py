@@ -65,7 +65,6 @@ def draw_arrangement(
     Parameters
     ----------
     arrangement : Arrangement, or polyhedron of :func:`thinned` or :func:`scaled`
-        Of the latter for one point.
     points : (N,), (T, N) or (T, n, k) array
         The last for ``n`` bodies like one, such as ``path.q[[-1]]`` of a motion.
     titles : sequence of str, optional
@@ -88,26 +87,31 @@ def draw_arrangement(
         contacts.
     """
     if isinstance(arrangement, Resized):
-        at = arrangement.manifold.point(points)
-        arrangement, points = arrangement.at(at), at[:-1]
-    poses = poses_of(arrangement, points, "points")
-    count = len(poses)
+        places = np.atleast_2d(arrangement.manifold.points(points, "points"))
+        each = [(arrangement.at(q), q[:-1]) for q in places]
+    else:
+        each = [(arrangement, points)]
+    several = [poses_of(*one, "points") for one in each]
+    marks = [
+        m for poses, (_, q) in zip(several, each, strict=True) for m in _marks(poses, q, contacts)
+    ]
+    count, poses = len(marks), several[0]
     if titles is not None and len(titles) != count:
         refuse("titles", f"{count} titles, one for each point", len(titles))
-    marks = _marks(poses, points, contacts)
     pushes = None
     if forces is not None:
-        pushes = finite(arguments.points("forces", forces, arrangement.dimension), "forces")
+        d = poses.arrangement.dimension
+        pushes = finite(arguments.points("forces", forces, d), "forces")
         if count > 1 or pushes.shape != marks[0].shape:
             refuse("forces", "one for each of the contacts of a single picture", forces)
     columns = min(whole("columns", columns, least=1), count)
     named = count == 1 and len(poses.kinds) <= MOST_NAMES if names is None else names
     framed = count == 1 if axes is None else axes
-    return grid_of(poses, marks, titles, columns, framed=framed, named=named, forces=pushes)
+    return grid_of(several, marks, titles, columns, framed=framed, named=named, forces=pushes)
 
 
 def grid_of(
-    poses: Poses,
+    several: Sequence[Poses],
     marks: Sequence[Array],
     titles: Sequence[str] | None,
     columns: int,
@@ -117,9 +121,11 @@ def grid_of(
     forces: Array | None = None,
 ) -> Figure:
     """Draw bodies at each instant side by side at the same scale, with marks ``(m, d)``."""
-    count, space = len(poses), poses.arrangement.dimension == 3
+    shown = [(poses, k) for poses in several for k in range(len(poses))]
+    count, space = len(shown), several[0].arrangement.dimension == 3
     rows, cell = math.ceil(count / columns), ALONE if count == 1 else CELL
-    window = window_of(poses)
+    windows = np.array([window_of(poses) for poses in several])
+    window = np.array([windows[:, 0].min(axis=0), windows[:, 1].max(axis=0)])
     lines = 0.2 + 0.25 * max((title.count("\n") for title in titles or ()), default=0)
     figure = Figure(figsize=(cell * columns, (cell + lines) * rows), layout="constrained")
     kind = {"projection": "3d", "computed_zorder": False} if space else {}
@@ -128,10 +134,11 @@ def grid_of(
         if k >= count or not framed:
             pane.set_axis_off()
         else:
-            _label(pane, poses.arrangement)
+            _label(pane, several[0].arrangement)
         if k < count:
-            (draw_space if space else draw_plane)(pane, poses, k, window)
-            _annotate(pane, poses.placed(k) if named else {}, marks[k], forces, window)
+            poses, at = shown[k]
+            (draw_space if space else draw_plane)(pane, poses, at, window)
+            _annotate(pane, poses.placed(at) if named else {}, marks[k], forces, window)
             if titles is not None:
                 pane.set_title(titles[k], fontsize=9)
     return figure

@@ -77,7 +77,7 @@ def _along(model: Arrangement, polyline: Any, frames: int) -> Figure:
 
 
 def _strip(poses: Poses, titles: list[str]) -> Figure:
-    return grid_of(poses, [poses.marks(k) for k in range(len(poses))], titles, len(poses))
+    return grid_of([poses], [poses.marks(k) for k in range(len(poses))], titles, len(poses))
 
 
 def _named(contacts: set[str]) -> str:

@@ -303,7 +303,6 @@ def masses(mass, centre, inertia):
 @pytest.mark.parametrize(
     ("make", "kind", "said"),
     [
-        (system(polygon(TRIANGLE)), ValueError, "walls: .* sharp bodies"),
         (system(friction=0.1), ValueError, "orientations"),
         (system(friction=-1), ValueError, "friction"),
         (system(gravity=[1, 2, 3]), ValueError, "gravity"),

@@ -54,7 +54,7 @@ def test_an_engine_refuses_saved_places_that_are_not_finite():
     engine = start(*STATES["discs"], 1e-3)
     arrays = {name: array.copy() for name, array in engine.save().items()}
     arrays["q"][2, 1] = np.nan
-    with pytest.raises(ValueError, match="yD = nan of body 2"):
+    with pytest.raises(ValueError, match="yD = nan of body 'D 3'"):
         engine.load(arrays)
 
 
