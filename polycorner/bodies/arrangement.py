@@ -1,6 +1,6 @@
 """Arrangements: rigid bodies, what stands between them, and their placements without overlap."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from itertools import chain
@@ -69,13 +69,17 @@ def named(given: Any) -> dict[str, Body]:
 
 
 def check_together(
-    bodies: Mapping[str, Body], fixed: Mapping[str, Body], walls: Mapping[str, Wall]
+    bodies: Mapping[str, Body],
+    fixed: Mapping[str, Body],
+    walls: Mapping[str, Wall],
+    joints: Iterable[str] = (),
 ) -> None:
     """Raise ValueError for a name of two things, or things in the plane and in space."""
-    known = [*bodies, *fixed, *walls]
+    known = [*bodies, *fixed, *walls, *joints]
     twice = sorted({name for name in known if known.count(name) > 1})
     if twice:
-        refuse("fixed" if twice[0] in fixed else "walls", "names of their own", twice[0])
+        last = "joints" if twice[0] in joints else "walls" if twice[0] in walls else "fixed"
+        refuse(last, "names of their own", twice[0])
     first, body = next(iter(bodies.items()))
     space = "the plane" if body.dimension == 2 else "space"
     for argument, several in (("bodies", bodies), ("fixed", fixed), ("walls", walls)):
@@ -188,8 +192,8 @@ class Arrangement(Checked, Printed):
                 refuse("walls", "half-spaces and cylinders", wall, TypeError)
         checks.instance("unit", self.unit, str)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
-        check_together(self.named, self.fixed, self.walls)
         object.__setattr__(self, "joints", dict(checks.mapping("joints", self.joints)))
+        check_together(self.named, self.fixed, self.walls, self.joints)
         check_joints(self.joints, self.named, self.fixed)
         if self.joints and self.orientations == "none":
             refuse("orientations", "'needed' or 'all' where there are joints", "none")
@@ -199,6 +203,12 @@ class Arrangement(Checked, Printed):
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
         check_room(self.lattice, self.placements, self.walls)
         object.__setattr__(self, "turning", angular("turning", self.turning, self.dimension))
+        repeated = np.eye(self.dimension)[list(self.lattice.axes)]
+        if np.any(self.turning) and len(repeated):
+            # Only what goes on along the axis is the same in every period.
+            along = self.dimension == 3 and len(repeated) == 1
+            if not along or np.linalg.norm(np.cross(repeated[0], self.turning)) > 0:
+                refuse("turning", "0, or about the only direction that is periodic", self.turning)
         super().__post_init__()
 
     def __repr__(self) -> str:

@@ -13,7 +13,7 @@ from polycorner.bodies import constraints
 from polycorner.bodies.constraints import check_fit, geared, has_coordinate, inequalities, relative
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.holds import Coordinate, Holding
-from polycorner.bodies.joints import WORLD, AnyJoint, Gear, Joint
+from polycorner.bodies.joints import WORLD, AnyJoint, Gear, Hinge, Joint
 from polycorner.bodies.poses import Placement, pose_of
 from polycorner.bodies.shapes import Body
 from polycorner.checks import about, refuse
@@ -138,16 +138,17 @@ def completed(
 
     Joints with a value come first; others are where their coordinate is zero.
     """
-    given = dict(checks.mapping("placed", placed))
+    given, stated = dict(checks.mapping("placed", placed)), values
     joints = {name: j for name, j in mechanism.joints.items() if isinstance(j, Joint)}
     checks.names("joints", checks.mapping("joints", values), joints)
     if not joints:
         return given
+    values = followed(mechanism, values)
     d = mechanism.placements[0].body.dimension
     poses = dict.fromkeys((WORLD, *fixed), (np.zeros(d), np.eye(d)))
     bodies = [p.name for p in mechanism.placements]
     poses |= {n: pose_of("placed", one, d) for n, one in given.items() if n in bodies}
-    idle = set(values)
+    idle = set(stated)
     waiting = sorted(joints, key=lambda name: name not in values)
     while name := next((n for n in waiting if 0 < _known(joints[n], poses) < 2), None):
         joint = joints[name]
@@ -170,6 +171,27 @@ def completed(
             angle = math.atan2(matrix[1, 0], matrix[0, 0])
             given[name] = origin, angle if d == 2 else Rotation.from_matrix(matrix)
     return given
+
+
+def followed(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of joints with those that follow from them by gears."""
+    found = dict(values)
+    gears = [joint for joint in mechanism.joints.values() if isinstance(joint, Gear)]
+    for _ in gears:  # one may follow another
+        for gear in gears:
+            if gear.first in found:
+                found.setdefault(gear.second, gear.ratio * found[gear.first] + gear.phase)
+            elif gear.second in found:
+                found[gear.first] = (found[gear.second] - gear.phase) / gear.ratio
+    for gear in gears:
+        first, second = (found.get(name, 0.0) for name in (gear.first, gear.second))
+        off = gear.ratio * first + gear.phase - second
+        if isinstance(mechanism.joints[gear.second], Hinge):
+            off = math.remainder(off, math.tau)
+        if gear.first in found and abs(off) > DEFAULT.near:
+            expected = f"{gear.second!r} at {gear.ratio:g} times {gear.first!r}, as their gear has it"
+            refuse("joints", expected, second)
+    return found
 
 
 def _known(joint: Joint, poses: Mapping[str, Any]) -> int:

@@ -20,6 +20,7 @@ from polycorner.bodies import (
     Ball,
     Fixed,
     Gear,
+    HalfSpace,
     Hinge,
     Planar,
     Rail,
@@ -504,3 +505,31 @@ def test_what_cannot_be_closed_is_refused_with_the_equation():
     a = Arrangement({"A": capsule([-1, 0], [1, 0], 0.1)}, box([-9, -9], [9, 9]), joints=far)
     with pytest.raises(ValueError, match=r"placed: .*joints hold, also '[lr]\.x'"):
         a.point({"A": ([2, 0], 0.1)})
+
+
+def test_a_value_is_kept_and_what_is_geared_to_it_follows():
+    wheels = {"A": disc(1), "B": disc(2)}
+    joints = {
+        "a": Hinge("world", "A"),
+        "b": Hinge("world", "B", at=[4, 0]),
+        "gear": Gear("a", "b", -0.5),
+    }
+    arrangement = Arrangement(wheels, joints=joints, orientations="all")
+    for given in ({"a": 0.2}, {"b": -0.1}, {"a": 0.2, "b": -0.1}):
+        values = arrangement.joint_values(arrangement.point({}, joints=given))
+        assert float(values["a"]) == pytest.approx(0.2, abs=1e-9)
+        assert float(values["b"]) == pytest.approx(-0.1, abs=1e-9)
+    with pytest.raises(ValueError, match=r"^joints: expected 'b' at -0\.5 times 'a'"):
+        arrangement.point({}, joints={"a": 0.2, "b": 0.1})
+
+
+def test_names_of_joints_are_their_own():
+    with pytest.raises(ValueError, match=r"^joints: expected names of their own; got 'floor'"):
+        Arrangement({"A": disc(1)}, box([0, 0], [9, 9]) | {"floor": box([0, 0], [9, 9])["bottom"]},
+                    joints={"floor": Hinge("world", "A", at=[3, 3])})  # fmt: skip
+
+
+def test_axes_that_turn_have_no_periods_across():
+    floor = {"floor": HalfSpace([0, 1], [0, 0])}
+    with pytest.raises(ValueError, match=r"^turning: expected 0, or about the only direction"):
+        Arrangement({"D": disc(1.0)}, floor, period=[5, None], turning=1.0)
