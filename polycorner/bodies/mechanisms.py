@@ -189,7 +189,7 @@ def followed(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(mechanism.joints[gear.second], Hinge):
             off = math.remainder(off, math.tau)
         if gear.first in found and abs(off) > DEFAULT.near:
-            expected = f"{gear.second!r} at {gear.ratio:g} times {gear.first!r}, as their gear has it"
+            expected = f"{gear.second!r} at {gear.ratio:g} times {gear.first!r}, by their gear"
             refuse("joints", expected, second)
     return found
 

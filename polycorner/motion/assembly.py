@@ -81,11 +81,6 @@ class Assembly(MechanicalSystem):
     between: Mapping[Pair, ContactFamily | HullContacts] = field(default_factory=dict)
     scene: Scene | None = None
 
-    def __repr__(self) -> str:
-        """Return how many bodies of each kind there are, in one line."""
-        told = ", ".join(f"{n} {name}" for name, n in self.count.items())
-        return f"Assembly({sum(self.count.values())} bodies: {told})"
-
     def __post_init__(self) -> None:
         kinds, count = mapping("kinds", self.kinds), mapping("count", self.count)
         if not kinds:

@@ -284,11 +284,6 @@ def test_without_a_period_nothing_changes():
             ValueError,
             "walls: .*got 'a'",
         ),
-        (
-            lambda: Arrangement([disc(0.1)], period=[3, 3]).polyhedron,
-            ValueError,
-            "bodies: expected several",
-        ),
     ],
 )
 def test_what_is_refused(make, kind, said):

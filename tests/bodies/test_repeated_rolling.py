@@ -139,8 +139,9 @@ def test_a_step_is_a_solution_of_the_inclusion(seed):
     speed, spin = found.v[:, :3], angular(middle, found.v)
     pushed = mass * speed - h * mass * np.array([0, 0, -G])
     turned = inertia * (spin - angular(middle, np.array(v)))
+    normal, friction = found.normal.reshape(4, -1), found.friction.reshape(4, -1, 2)
     contacts = [
-        ((i, None), np.array([0, 0, 1.0]), R, found.normal[i, 0], [*found.friction[i]], "ground")
+        ((i, None), np.array([0, 0, 1.0]), R, normal[i, 0], [*friction[i]], "ground")
         for i in range(3)
     ]
     pairs = [divmod(int(key), 4) for key in found.keys[: found.counts[0]]]

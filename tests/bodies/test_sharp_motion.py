@@ -476,8 +476,6 @@ def test_what_is_refused_is_refused_at_once():
         on_the_floor(many_sided(65), 2)
     with pytest.raises(NotImplementedError, match=r"^rolling: expected 0 between sharp polygons"):
         on_the_floor(brick(1, 1), 2, rolling={"between": 0.1})
-    with pytest.raises(ValueError, match=r"^walls: expected a wall around sharp bodies"):
-        Arrangement([brick(1, 1)] * 2).system()
     walls = {"low": HalfSpace([0, 1], [0, 0])}
     listed = Arrangement([brick(1, 1)] * 2, walls, orientations="all").system()
     with pytest.raises(NotImplementedError, match=r"^system: .* none of two sharp hulls"):
