@@ -207,7 +207,7 @@ class Arrangement(Checked, Printed):
         if np.any(self.turning) and len(repeated):
             # Only what goes on along the axis is the same in every period.
             along = self.dimension == 3 and len(repeated) == 1
-            if not along or np.linalg.norm(np.cross(repeated[0], self.turning)) > 0:
+            if not along or np.cross(repeated[0], np.asarray(self.turning)).any():
                 refuse("turning", "0, or about the only direction that is periodic", self.turning)
         super().__post_init__()
 

@@ -259,8 +259,9 @@ class Trajectory(Checked, Printed):
         """
         # The one way up: people look for the method here, and the dataset is that of files.
         # By name: files know of trajectories.
-        trajectory_dataset = import_module("polycorner.files.trajectories").trajectory_dataset
-        return trajectory_dataset(self, units=units)
+        files = import_module("polycorner.files.trajectories")
+        found: xr.Dataset = files.trajectory_dataset(self, units=units)
+        return found
 
     @checked
     def stratum(self, index: int, *, tolerance: float = 1e-6) -> "Stratum":
