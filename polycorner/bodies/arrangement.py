@@ -545,7 +545,7 @@ class Arrangement(Checked, Printed):
     def joint_values(self, q: ArrayLike) -> dict[str, Array]:
         """Return the angles and positions of all joints that have one, ``(...)`` at ``(..., N)``.
 
-        Angles are within half a turn; :func:`numpy.unwrap` follows them along a path.
+        Angles are within half a turn; ``numpy.unwrap`` follows them along a path.
         """
         return self.mechanism.values(self.manifold, self.manifold.points(q))
 

@@ -64,7 +64,7 @@ def draw_arrangement(
 
     Parameters
     ----------
-    arrangement : Arrangement, or polyhedron of :func:`thinned` or :func:`scaled`
+    arrangement : Arrangement, or polyhedron of :func:`~polycorner.bodies.thinned` or `scaled`
     points : (N,), (T, N) or (T, n, k) array
         The last for ``n`` bodies like one, such as ``path.q[[-1]]`` of a motion.
     titles : sequence of str, optional
