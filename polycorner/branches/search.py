@@ -215,7 +215,7 @@ def branches(  # noqa: PLR0913 - keywords of one search
     options : WalkOptions, optional
         Steps along the arcs, in scale units and fifths of the interval.
     max_arcs, max_seconds : int, float, optional
-        Arcs and time after which the search ends; the diagram is not :attr:`~polycorner.branches.Diagram.closed` then.
+        Arcs and time after which the search ends; the diagram is not ``Diagram.closed`` then.
     progress : callable, optional
         Told the numbers of arcs followed and known.
 

@@ -85,7 +85,7 @@ def read_urdf(
     radius about its axis, which reaches a radius beyond its ends, or a prism around it; meshes as
     ``shapes`` says.  Visual shapes, transmissions and plugins are left out.  Links that overlap
     with all joints at zero, or at the limit next to it, are taken not to touch: they are
-    :attr:`~polycorner.bodies.Robot.ignored`.  Limits without numbers are none, as simulators take them.
+    ``Robot.ignored``.  Limits without numbers are none, as simulators take them.
     Names become those of Python, with ``_`` for other characters.
 
     Parameters

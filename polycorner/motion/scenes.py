@@ -85,7 +85,7 @@ class ContactForce(Checked):
     Attributes
     ----------
     bodies : tuple of int
-        As in :attr:`~polycorner.Trajectory.touching`.
+        As in ``Trajectory.touching``.
     contact : str
     between : tuple of str
         The names of the two that touch, where the system knows them; else empty.
