@@ -439,13 +439,13 @@ def test_symmetries_leave_joints_alone():
 
 def test_thinned_bodies_keep_their_joints():
     """Two discs whose centres a slider guides in a box are as thick as the box and they allow."""
-    rail = {f"{n}": Slider("world", n, at=[0, 1], axis=[1, 0], limits=(0.0, 3.0)) for n in "AB"}
+    rail = {f"rail{n}": Slider("world", n, at=[0, 1], axis=[1, 0], limits=(0.0, 3.0)) for n in "AB"}
     a = Arrangement(dict.fromkeys("AB", disc(1.0)), box([0, 0], [4, 2]), joints=rail)
     D = thinned(a)
-    assert D.names[-6:-2] == ("A.min", "A.max", "B.min", "B.max")
+    assert D.names[-6:-2] == ("railA.min", "railA.max", "railB.min", "railB.max")
     q = [0.9, 1.0, 0.0, 2.8, 1.0, 0.0, 0.5]
     assert len(D.equation_values(q)) == 4
-    assert D.values(q)[D.names.index("B.max")] == pytest.approx(0.2)
+    assert D.values(q)[D.names.index("railB.max")] == pytest.approx(0.2)
 
 
 # -------------------------------------------------------------------------------------- errors
