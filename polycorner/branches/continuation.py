@@ -16,8 +16,6 @@ from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.skeletons.sign_changes import may_vanish, sign_change
 from polycorner.spaces.manifold import Array
 
-NEWTON = 8
-
 
 class Stop(Enum):
     """Why a continuation stopped; the value is the predicate of a sentence."""
@@ -54,11 +52,20 @@ class Course:
 
 
 def corrected(
-    system: FritzJohnSystem, face: Face, x: Array, across: Array, reach: float
+    system: FritzJohnSystem,
+    face: Face,
+    x: Array,
+    across: Array,
+    reach: float,
+    *,
+    steps: int = 8,
 ) -> FritzJohn | None:
-    """Return the point of the curve in the plane through ``x`` across a direction, or None."""
+    """Return the point of the curve in the plane through ``x`` across a direction, or None.
+
+    None too where Newton's method strays more than ``reach`` or needs more than ``steps``.
+    """
     at, start, last = system.point(face, x), x, math.inf
-    for _ in range(NEWTON):
+    for _ in range(steps):
         if not at.finite:
             return None
         matrix = np.vstack([at.jacobian, across])
@@ -74,10 +81,10 @@ def corrected(
     return None
 
 
-def polished(at: FritzJohn, j: int) -> FritzJohn | None:
-    """Return the point of the curve nearby where what is watched at ``j`` vanishes."""
+def polished(at: FritzJohn, j: int, *, steps: int = 8) -> FritzJohn | None:
+    """Return the point of the curve nearby where what is watched at ``j`` vanishes, or None."""
     start = at.x
-    for _ in range(NEWTON):
+    for _ in range(steps):
         values, slopes = at.watched()
         matrix, left = np.vstack([at.jacobian, slopes[j]]), np.append(at.left, values[j])
         step = np.linalg.lstsq(matrix, -left, rcond=at.system.tolerances.rounding)[0]

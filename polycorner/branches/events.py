@@ -32,7 +32,6 @@ from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.polyhedra.strata import local_pieces
 from polycorner.spaces.manifold import Array
 
-MOST_WEAK = 10  # functions that vanish at one event
 # Kinds that are told by what leaves an event.
 TOLD = BranchKind.OPENS
 
@@ -72,8 +71,8 @@ def event_at_end(way: Course) -> Node:
     return flat_event(at, way.tangent) if way.stop is Stop.FLAT else weak_event(at)
 
 
-def weak_event(at: FritzJohn) -> Node:
-    """Return the event where functions or multipliers vanish."""
+def weak_event(at: FritzJohn, most: int = 10) -> Node:
+    """Return the event where functions vanish, or multipliers; of more than ``most`` it says so."""
     system, m = at.system, at.system.problem.inequalities
     values, small = at.watched()[0], 10 * at.system.tolerances.zero
     vanish = abs(values) <= small
@@ -81,8 +80,8 @@ def weak_event(at: FritzJohn) -> Node:
     if vanish[m + 1] or vanish[m + 2]:
         return Node(at, BranchKind.END, weak)
     node = Node(at, TOLD, weak)
-    if len(weak) > MOST_WEAK:
-        node.notes.append(f"{len(weak)} functions vanish there, more than {MOST_WEAK}")
+    if len(weak) > most:
+        node.notes.append(f"{len(weak)} functions vanish there, more than {most}")
         return node
     firm = set(at.face).difference(weak)
     # Relations of equations alone hold with either sign.
