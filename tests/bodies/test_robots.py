@@ -207,7 +207,16 @@ def check_gaps(robot, seed):
     """Compare the least gap of each pair with the distance of the bodies in their places."""
     q, _ = somewhere(robot, seed)
     placed, functions = robot.placed(q), robot.polyhedron.functions
-    assert robot.polyhedron.contains(robot.home) == (not robot.overlapping(robot.home))
+    # The base stays where it is and has no height to keep.
+    moving = {joint.child for joint in robot.joints.values()}
+    parts = [part for link in moving for part in robot.placed(robot.home)[link].parts.values()]
+    heights = [
+        ((part.points - wall.point) @ wall.normal).min() - part.radius
+        for part in parts
+        for wall in robot.walls.values()
+    ]
+    free = not robot.overlapping(robot.home) and min(heights) >= 0
+    assert robot.polyhedron.contains(robot.home) == free
     for one, two in combinations(robot.links, 2):
         links = {one, two}
         between = [f for f in functions if {x.split(".")[0] for x in f.name.split("-")} == links]
