@@ -356,8 +356,9 @@ def draw_space(axes: Any, poses: Poses, k: int, window: Array) -> None:
         np.concatenate(triangles), facecolors=np.concatenate(shades), edgecolors="none", zorder=2
     )
     axes.add_collection3d(drawn)
-    lines = wall_lines(poses.arrangement, window)
-    axes.add_collection3d(Line3DCollection(lines, colors=FIXED, linewidths=0.7, zorder=1))
+    # matplotlib takes the limits of a collection from its lines and refuses to have none.
+    if lines := wall_lines(poses.arrangement, window):
+        axes.add_collection3d(Line3DCollection(lines, colors=FIXED, linewidths=0.7, zorder=1))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect((1, 1, 1), zoom=0.95 if axes.axison else 1.5)
 

@@ -50,3 +50,9 @@ def test_in_space_bodies_are_in_the_box():
     low, high = figure.axes[0].get_xlim()
     assert (low, high) == pytest.approx((-0.15, 1.15), abs=0.05)
     assert len(figure.axes[0].collections) == 2
+
+
+def test_in_space_without_walls_there_are_no_outlines():
+    a = Arrangement([sphere(0.1), sphere(0.2)])
+    figure = draw_arrangement(a, a.point({"1": [0, 0, 0], "2": [0.5, 0, 0]}))
+    assert len(figure.axes[0].collections) == 1
