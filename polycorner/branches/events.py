@@ -61,7 +61,7 @@ class Node:
         return not self.notes and self.kind is not BranchKind.UNDECIDED
 
 
-def event_at_end(way: Course) -> Node:
+def event_at_end(way: Course[FritzJohn]) -> Node:
     """Return the event at the end of a part of a curve."""
     at = way.last
     if way.stop is Stop.FAR:
@@ -74,10 +74,10 @@ def event_at_end(way: Course) -> Node:
 def weak_event(at: FritzJohn, most: int = 10) -> Node:
     """Return the event where functions vanish, or multipliers; of more than ``most`` it says so."""
     system, m = at.system, at.system.problem.inequalities
-    values, small = at.watched()[0], 10 * at.system.tolerances.zero
+    values, small = at.watched()[0], at.system.tolerances.same
     vanish = abs(values) <= small
     weak = tuple(np.flatnonzero(vanish[:m]).tolist())
-    if vanish[m + 1] or vanish[m + 2]:
+    if vanish[m + 1 :].any():
         return Node(at, BranchKind.END, weak)
     node = Node(at, TOLD, weak)
     if len(weak) > most:

@@ -79,7 +79,7 @@ class _BranchSearch:
         waiting = sum(arm.arc < 0 for node in self.nodes for arm in node.arms)
         return len(self.edges), len(self.edges) + waiting, "arcs"
 
-    def _follow(self, at: FritzJohn, direction: np.ndarray) -> Course:
+    def _follow(self, at: FritzJohn, direction: np.ndarray) -> Course[FritzJohn]:
         return follow(at, direction, self.options, extent=self.extent)
 
     def _leave(self, k: int, arm: Arm) -> None:
@@ -91,7 +91,7 @@ class _BranchSearch:
         self.edges.append(_Edge(arm.face, way.points, [k, -1]))
         self._arrive(way, arm.arc, 1)
 
-    def _arrive(self, way: Course, edge: int, end: int) -> None:
+    def _arrive(self, way: Course[FritzJohn], edge: int, end: int) -> None:
         """Register the end of an arc at an event, a new one or one that is known."""
         at, back = way.last, -way.tangent
         k = self._known(at)
@@ -100,8 +100,9 @@ class _BranchSearch:
             self.nodes.append(event_at_end(way))
         node = self.nodes[k]
         self.edges[edge].ends[end] = k
+        alike = math.cos(self.options.turn)
         for arm in node.arms:
-            if arm.arc < 0 and arm.face == at.face and arm.direction @ back > 0.9:
+            if arm.arc < 0 and arm.face == at.face and arm.direction @ back > alike:
                 arm.arc = edge
                 return
         node.arms.append(Arm(at.face, back, edge))
@@ -126,8 +127,7 @@ class _BranchSearch:
                 continue
             part = (at.s - one.s) / ((two.s - one.s) or 1.0)
             pin = np.eye(len(at.x))[n]
-            guess = one.x + part * (two.x - one.x)
-            found = corrected(self.system, at.face, guess, pin, math.inf)
+            found = corrected(at.moved(one.x + part * (two.x - one.x)), pin, math.inf)
             if found is not None and self._apart(found, at) <= self.system.tolerances.near:
                 return True
         return False
@@ -348,7 +348,7 @@ def _start(
     face = tuple(i for i in a.active if i not in weak)
     u = certificate.point / system.manifold.scale_array
     x = system.guess(face, u, s, lam / np.linalg.norm(lam))
-    found = corrected(system, face, x, np.eye(len(x))[system.n], math.inf)
+    found = corrected(system.point(face, x), np.eye(len(x))[system.n], math.inf)
     if found is None:
         expected = "an equilibrium that is isolated, modulo the symmetry, at its parameter"
         checks.refuse("certificate", expected, repr(certificate))

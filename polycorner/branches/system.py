@@ -19,7 +19,7 @@ arc ends where one of these vanishes, and there exactly one arc of another face 
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -168,6 +168,14 @@ class FritzJohn:
         J[n + k + 1 :, :n] = self.orbit
         self.jacobian = J
         self.finite = bool(np.isfinite(J).all() and np.isfinite(self.left).all())
+
+    def moved(self, x: Array) -> Self:
+        """Return the equations at another guess."""
+        return type(self)(self.system, self.face, x)
+
+    def spectra(self) -> list[Array]:
+        """Return numbers, ascending, of which none may change sign along a curve."""
+        return [self.curvatures()]
 
     def kernel(self) -> tuple[Array, Array]:
         """Return singular values ``(N,)``, ascending, and their vectors, of the Jacobian."""

@@ -292,7 +292,7 @@ def _read_sizes(content: Entries, n: int, m: int) -> Entries:
     }
     later = {
         "rank tolerance": number(above=0, below=1),
-        "options": made(entries(options), lambda read: WalkOptions(**read)),
+        "options": made(entries({}, options), lambda read: WalkOptions(**read)),
         "patches": many(row(active, point)),
         "origins": many(point),
     }

@@ -35,11 +35,17 @@ class WalkOptions(Checked):
     first_step, longest_step, shortest_step : float
         Steps of a walk: at its start, at most near the start, and at least: one that has to be
         shorter ends the walk.
+    growth : float
+        Longest step over the one before.
+    reach : float
+        Longest correction, relative to the step.
     turn : float
         Largest turn of the tangent in a step, in radians.
-    stray : float
-        Deviation from the tangent, relative to the step, that is allowed besides what the turn
-        explains; a larger one leads to another curve.
+    ease : float
+        Part of it that a step is planned for.
+    arc, stray : float
+        Deviation from the tangent, relative to the step, that is allowed for each radian of the
+        turn (a circle deviates by half of it), and besides; a larger one leads to another curve.
     tip : float
         Distance from the end of a walk at which a singular point is looked for.
     distances : (float, float, float)
@@ -73,7 +79,11 @@ class WalkOptions(Checked):
     first_step: float = 0.2
     longest_step: float = 0.5
     shortest_step: float = 1e-7
+    growth: float = 1.6
+    reach: float = 0.3
     turn: float = 0.25
+    ease: float = 0.8
+    arc: float = 0.75
     stray: float = 0.01
     tip: float = 1e-2
     distances: tuple[float, float, float] = (3e-3, 1e-3, 3e-4)
@@ -103,7 +113,7 @@ class WalkOptions(Checked):
     def careful(cls) -> Self:
         """Return those with half the steps, turns and distances."""
         usual = vars(cls())
-        kept = {"link_extent", "reached", "definite", "straight"}
+        kept = {"growth", "reach", "ease", "arc", "link_extent", "reached", "definite", "straight"}
         halved = {name: np.asarray(x) / 2 for name, x in usual.items() if name not in kept}
         return cls(**{name: x.tolist() for name, x in halved.items()})
 
