@@ -8,10 +8,11 @@ vanishes, where a curvature along the face does, or where the curve comes back t
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from polycorner.branches.branching import branch_point
 from polycorner.branches.system import FritzJohn
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.polyhedra.steppers import Stepper
@@ -124,12 +125,17 @@ class _Continuation(Stepper[P]):
             event = self._event(point, t)
             if event is not None:
                 where, stop = event
-                if stop is None:  # two curvatures vanish between the points
+                if stop is None:  # more happens between the points than one event
                     h = self.chord(point) / 2
                     if h > self.options.shortest_step:
                         continue
                     where, stop = point, Stop.LOST
-                self.move(where, where.tangent(self.t))
+                ahead = where.tangent(self.t)
+                if stop is Stop.FLAT and self.chord(where) > self.system.tolerances.beside:
+                    # At a branch point it is not determined by the Jacobian.
+                    ahead = 2 * self.way(where) / self.chord(where) - self.t
+                    ahead /= np.linalg.norm(ahead)
+                self.move(where, ahead)
                 return self._course(stop)
             home = self._home(point)
             self.move(point, t)
@@ -160,6 +166,19 @@ class _Continuation(Stepper[P]):
             where = self._zero(point, j, bool(begins[j]))
             if where is not None:
                 found.append((*where, Stop.EVENT))
+        found += self._flat(point, t)
+        if not found:
+            return None
+        _, at, stop = min(found, key=lambda e: e[0])
+        return at, stop
+
+    def _flat(self, point: P, t: Array) -> list[tuple[float, P, Stop | None]]:
+        """Return where curvatures vanish on the way to a point.
+
+        Without a stop where more than one does.
+        """
+        del t  # a subclass looks at it
+        found: list[tuple[float, P, Stop | None]] = []
         for i, (here, there) in enumerate(zip(self.point.spectra(), point.spectra(), strict=True)):
             n0, n1 = int((here < 0).sum()), int((there < 0).sum())
             # It leaves a fold: the curvature has a sign only beyond.
@@ -170,10 +189,7 @@ class _Continuation(Stepper[P]):
                 found.append((0.5, point, None))
             else:
                 found.append((*self._flattened(point, i, min(n0, n1)), Stop.FLAT))
-        if not found:
-            return None
-        _, at, stop = min(found, key=lambda e: e[0])
-        return at, stop
+        return found
 
     def _flattened(self, point: P, i: int, k: int) -> tuple[float, P]:
         """Return where the ``k``-th curvature on a face vanishes on the way to a point."""
@@ -185,7 +201,10 @@ class _Continuation(Stepper[P]):
         return sign_change(value)
 
     def _between(self, point: P, s: float) -> P:
-        return self.between(point, s, self.chord(point))
+        """Return the point of the curve a fraction of the way to another, or a guess of it."""
+        guess, way = self.guess(point, s), self.way(point)
+        found = self.corrected(guess, way / self.chord(point), self.chord(point))
+        return point.moved(guess) if found is None else found
 
     def _zero(self, point: P, j: int, begins: bool) -> tuple[float, P] | None:
         """Return where what is watched at ``j`` first vanishes on the way to a point."""
@@ -230,6 +249,78 @@ class _Continuation(Stepper[P]):
         return bool(passes and np.linalg.norm(aside) < self.options.turn / 2 * self.chord(point))
 
 
+class _ArcContinuation(_Continuation[FritzJohn]):
+    def _flat(self, point: FritzJohn, t: Array) -> list[tuple[float, FritzJohn, Stop | None]]:
+        """Return where a curvature vanishes on the way to a point, or the parameter turns back.
+
+        Without a stop where more than one of these happens.  Both signs of the same curvatures may
+        change at once at branch points, whose directions then change suddenly; and the parameter
+        may turn twice, which a cubic through its values and slopes tells.
+        """
+        n, beside = self.system.n, self.system.tolerances.beside
+        several: tuple[float, FritzJohn, Stop | None] = (0.5, point, None)
+        before, after = float(self.t[n]), float(t[n])
+        one, two = self.point.falling, point.falling
+        change, h = point.s - self.point.s, self.chord(point)
+        if len(self.passed) == 1 and (abs(before) <= beside or self._is_flat()):
+            # It leaves a fold or a branch point: signs are those beyond.
+            return [several] if after * change < 0 and h > beside else []
+        if before * after < 0 and max(abs(before), abs(after)) > self.system.tolerances.same:
+            return [(*self._turned(point, t), Stop.FLAT)]
+        if len(one) == len(two):
+            across = np.linalg.svd(one @ two.T, compute_uv=False).min(initial=1.0)
+            twice = _turns((h * before, h * after), change) or self._dips(point, t)
+            if across > 0.5 and not (twice and h > beside):
+                return []
+        elif abs(len(one) - len(two)) == 1:
+            return [(*self._flattened(point, 0, min(len(one), len(two))), Stop.FLAT)]
+        if h > beside:
+            return [several]
+        branching = branch_point(point)
+        return [] if branching is None else [(0.5, branching.at, Stop.FLAT)]
+
+    def _dips(self, point: FritzJohn, t: Array) -> bool:
+        """Whether a curvature may have touched zero on the way to a point.
+
+        That is so where a step has jumped from one curve through a branch point to another.
+        """
+        h, low = self.chord(point), self.point.curvatures()
+        if len(low) == 0:
+            return False
+        side = np.where(low < 0, -1.0, 1.0)
+        values = side * low, side * point.curvatures()
+        slopes = side * self._bending(self.point, self.t), side * self._bending(point, t)
+        return bool(may_vanish(values, slopes, h * (abs(slopes[0]) + abs(slopes[1])), h))
+
+    def _bending(self, at: FritzJohn, t: Array) -> Array:
+        """Return the derivatives of the curvatures along a tangent."""
+        d = self.system.tolerances.difference
+        ahead = at.moved(at.x + d * t)
+        return np.asarray((ahead.curvatures() - at.curvatures()) / d)
+
+    def _turned(self, point: FritzJohn, t: Array) -> tuple[float, FritzJohn]:
+        """Return where the parameter turns back on the way to a point."""
+
+        def value(s: float) -> tuple[float, FritzJohn]:
+            at = self._between(point, s)
+            return float(at.tangent((1 - s) * self.t + s * t)[self.system.n]), at
+
+        return sign_change(value)
+
+    def _is_flat(self) -> bool:
+        curvatures = abs(self.point.curvatures())
+        return bool(curvatures.min(initial=math.inf) <= self.system.tolerances.near)
+
+
+def _turns(slopes: tuple[float, float], change: float) -> bool:
+    """Whether the cubic on ``[0, 1]`` with slopes of one sign and a change turns in between."""
+    first, last = np.sign(slopes[0] + slopes[1]) * np.array(slopes)
+    change *= float(np.sign(slopes[0] + slopes[1]))
+    # The slope is  first + b s + a s^2.
+    a, b = 3 * (first + last - 2 * change), 2 * (3 * change - 2 * first - last)
+    return bool(b < 0 < a and -b < 2 * a and first < b * b / (4 * a))
+
+
 def follow(
     start: P,
     direction: Array,
@@ -251,4 +342,5 @@ def follow(
     most : int, optional
         Steps, at most.
     """
-    return _Continuation(start, direction, options, extent, most).run()
+    kind: type[_Continuation[Any]] = _ArcContinuation if type(start) is FritzJohn else _Continuation
+    return kind(start, direction, options, extent, most).run()

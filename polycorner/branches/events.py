@@ -10,9 +10,7 @@ equilibrium persists; if it turns back, this is a corner limit ([SchulzPellegrin
 index of the two arcs differs by one.
 
 *A curvature along the face vanishes.*  If the curve is regular, the parameter turns back: a fold.
-Where the Jacobian loses one more rank, with kernel ``t, w`` and left kernel ``z``, curves leave
-along the zeros of the form ``z F''`` on the kernel; ``t`` is one, so that ``2 q_tw w - q_ww t`` is
-the other ([Gov] ch. 6).
+Else this is a branch point (:mod:`polycorner.branches.branching`).
 
 *Gradients depend.*  Where the energy's multiplier vanishes, ``sum mu_i df_i = 0`` with ``mu > 0``,
 and ``D`` lies where ``sum mu_i f_i >= 0``.  If the Hessian of this sum is negative definite on the
@@ -25,6 +23,7 @@ from itertools import chain, combinations
 
 import numpy as np
 
+from polycorner.branches.branching import branch_point, curves
 from polycorner.branches.continuation import Course, Stop
 from polycorner.branches.diagram import BranchKind
 from polycorner.branches.system import Face, FritzJohn
@@ -68,7 +67,11 @@ def event_at_end(way: Course[FritzJohn]) -> Node:
         return Node(at, BranchKind.FAR)
     if way.stop in {Stop.LOST, Stop.LONG}:
         return Node(at, BranchKind.UNDECIDED, notes=[way.stop.value])
-    return flat_event(at, way.tangent) if way.stop is Stop.FLAT else weak_event(at)
+    if way.stop is Stop.EVENT:
+        return weak_event(at)
+    node = flat_event(at, way.tangent)
+    vanish = abs(node.at.watched()[0]) <= 10 * at.system.tolerances.zero
+    return weak_event(node.at) if vanish.any() else node
 
 
 def weak_event(at: FritzJohn, most: int = 10) -> Node:
@@ -123,33 +126,18 @@ def _leaving(here: FritzJohn, node: Node, *, also: bool) -> Iterator[Arm]:
 
 def flat_event(at: FritzJohn, t: Array) -> Node:
     """Return the event where a curvature along the face vanishes, with the tangent of arrival."""
-    tolerances = at.system.tolerances
-    sizes, vectors = at.kernel()
-    if sizes[1] > tolerances.beside:
-        return Node(at, BranchKind.FOLD, arms=[Arm(at.face, at.tangent(t))])
-    node = Node(at, BranchKind.BRANCH, arms=[Arm(at.face, t), Arm(at.face, -t)])
-    if sizes[2] <= tolerances.beside:
-        node.notes.append("several curvatures vanish together")
-        return node
-    plane = vectors[:2] - np.outer(vectors[:2] @ t, t)
-    w = plane[int(np.argmax(np.linalg.norm(plane, axis=1)))]
-    w /= np.linalg.norm(w)
-    h = tolerances.beside
-    change = [
-        at.system.point(at.face, at.x + h * v).jacobian
-        - at.system.point(at.face, at.x - h * v).jacobian
-        for v in (t, w)
-    ]
-    # Rows that are dependent by symmetry, which hold identically, give no form.
-    left = null_space(at.jacobian.T, tolerances.beside)
-    forms = np.array([left.T @ (change[0] @ w), left.T @ (change[1] @ w)]) / (2 * h)
-    q_tw, q_ww = forms[:, int(np.argmax(abs(forms[0])))].tolist()
-    if abs(q_tw) <= tolerances.near:
-        node.notes.append("curves touch there")
-        return node
-    way = 2 * q_tw * w - q_ww * t
-    way /= np.linalg.norm(way)
-    node.arms += [Arm(at.face, way), Arm(at.face, -way)]
+    found, n = branch_point(at), at.system.n
+    if found is None:
+        turns = at.tangent(t)
+        exact = abs(at.left).max() <= at.system.tolerances.zero
+        if exact and abs(turns[n]) <= at.system.tolerances.near:
+            return Node(at, BranchKind.FOLD, arms=[Arm(at.face, turns)])
+        note = "a curvature vanishes, but neither a fold nor a branch point was found"
+        return Node(at, BranchKind.UNDECIDED, notes=[note])
+    node = Node(found.at, BranchKind.BRANCH)
+    tangents, note = curves(found)
+    node.notes += [note] if note else []
+    node.arms = [Arm(at.face, sign * v) for v in tangents for sign in (1.0, -1.0)]
     return node
 
 
@@ -178,7 +166,8 @@ def _is_point(at: FritzJohn) -> bool:
     """Whether the polyhedron near a point at which gradients depend is this point alone."""
     system, n = at.system, at.system.n
     rows = [i for i in at.face if at.mu[i] > system.tolerances.same]
-    if not rows or system.is_union:
+    small = 10 * system.tolerances.zero
+    if not rows or len(local_pieces(system.problem.polyhedron, at.known.values[:-1], small)) != 1:
         return False
     held = unit_rows(at.known.gradients[[*rows, *system.equations], :n])
     basis = null_space(np.vstack([held, at.orbit]), system.tolerances.rank)

@@ -9,7 +9,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.branches.continuation import Course, Stop, corrected, follow
-from polycorner.branches.diagram import Arc, BranchEvent, Diagram
+from polycorner.branches.diagram import Arc, BranchEvent, BranchKind, Diagram
 from polycorner.branches.events import (
     TOLD,
     Arm,
@@ -60,8 +60,9 @@ class _BranchSearch:
 
     def begin_at_event(self, at: FritzJohn) -> None:
         """Take an equilibrium on which functions vanish without a multiplier."""
-        if self._known(at) is None:
-            self.nodes.append(weak_event(at))
+        node = weak_event(at)
+        if self._known(node) is None:
+            self.nodes.append(node)
 
     def tasks(self, most: int) -> Iterator[Task]:
         """Yield the arcs that leave events and were not followed yet, to be followed."""
@@ -93,19 +94,24 @@ class _BranchSearch:
 
     def _arrive(self, way: Course[FritzJohn], edge: int, end: int) -> None:
         """Register the end of an arc at an event, a new one or one that is known."""
-        at, back = way.last, -way.tangent
-        k = self._known(at)
+        node, back, face = event_at_end(way), -way.tangent, way.last.face
+        k = self._known(node)
         if k is None:
             k = len(self.nodes)
-            self.nodes.append(event_at_end(way))
+            self.nodes.append(node)
         node = self.nodes[k]
         self.edges[edge].ends[end] = k
         alike = math.cos(self.options.turn)
-        for arm in node.arms:
-            if arm.arc < 0 and arm.face == at.face and arm.direction @ back > alike:
-                arm.arc = edge
-                return
-        node.arms.append(Arm(at.face, back, edge))
+        if node.at.face == face:
+            self.edges[edge].points[-end] = node.at
+        arms = [arm for arm in node.arms if arm.face == face and arm.direction @ back > alike]
+        best = max(arms, key=lambda arm: float(arm.direction @ back), default=None)
+        if best is not None and best.arc < 0:
+            best.arc = edge
+            return
+        if best is not None or node.kind is BranchKind.BRANCH:
+            node.notes.append("an arc arrives along a curve that is not known to leave")
+        node.arms.append(Arm(face, back, edge))
 
     def _apart(self, one: FritzJohn, two: FritzJohn) -> float:
         """Return how far two points are apart, with their multipliers."""
@@ -114,10 +120,12 @@ class _BranchSearch:
         parts = (moved / system.manifold.scale_array, one.mu - two.mu, [one.s - two.s])
         return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
-    def _known(self, at: FritzJohn) -> int | None:
-        near = self.system.tolerances.near
-        found = (k for k, node in enumerate(self.nodes) if self._apart(node.at, at) <= near)
-        return next(found, None)
+    def _known(self, node: Node) -> int | None:
+        near = self.system.tolerances.corner
+        for k, other in enumerate(self.nodes):
+            if other.weak == node.weak and self._apart(other.at, node.at) <= near:
+                return k
+        return None
 
     def _passes(self, edge: _Edge, at: FritzJohn) -> bool:
         """Whether an arc goes through a point."""
@@ -355,6 +363,15 @@ def _start(
     return found
 
 
+def _index(points: Sequence[FritzJohn]) -> int:
+    """Return the index between the ends of an arc, at which curvatures may vanish."""
+    one, two = points[0], points[-1]
+    middle = one.moved((one.x + two.x) / 2)
+    inner = points[1:-1] or [corrected(middle, two.x - one.x, math.inf) or middle]
+    best = max(inner, key=lambda at: float(abs(at.curvatures()).min(initial=math.inf)))
+    return len(best.falling)
+
+
 def _key(points: Sequence[FritzJohn]) -> tuple[float, ...]:
     """Return numbers by which arcs and events are listed: those of the parameter, then places."""
     ends = sorted((points[0].s, points[-1].s))
@@ -402,7 +419,7 @@ def _diagram(
                 points=np.array([system.place(p.u) for p in points]),
                 multipliers=certificate.problem.stated(stated),
                 energies=np.array([p.known.values[-1] for p in points]) * system.sizes[-1],
-                index=int((points[len(points) // 2].curvatures() < 0).sum()),
+                index=_index(points),
                 events=(event_of.get(ends[0], -1), event_of.get(ends[1], -1)),
             )
         )

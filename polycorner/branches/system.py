@@ -28,6 +28,7 @@ from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import Tolerances
+from polycorner.values import cached_property
 
 Face = tuple[int, ...]  # positions of the inequalities that are held, in ascending order
 
@@ -177,6 +178,13 @@ class FritzJohn:
         """Return numbers, ascending, of which none may change sign along a curve."""
         return [self.curvatures()]
 
+    @property
+    def bordered(self) -> Array:
+        """The Jacobian with columns along the orbit, which make its rows independent."""
+        across = np.zeros((len(self.jacobian), len(self.orbit)))
+        across[: self.system.n] = self.orbit.T
+        return np.hstack([self.jacobian, across])
+
     def kernel(self) -> tuple[Array, Array]:
         """Return singular values ``(N,)``, ascending, and their vectors, of the Jacobian."""
         _, values, vectors = np.linalg.svd(self.jacobian)
@@ -189,12 +197,23 @@ class FritzJohn:
         t = self.kernel()[1][0]
         return np.asarray(-t if like is not None and t @ like < 0 else t)
 
-    def curvatures(self) -> Array:
-        """Return eigenvalues of the Lagrangian's Hessian along the face, ascending."""
+    @cached_property
+    def _spectrum(self) -> tuple[Array, Array]:
         n, rows = self.system.n, self.system.rows(self.face)[:-1]
         held = np.vstack([self.known.gradients[rows, :n], self.orbit])
         basis = null_space(unit_rows(held), self.system.tolerances.rank)
-        return np.asarray(np.linalg.eigvalsh(basis.T @ self.curvature @ basis))
+        values, vectors = np.linalg.eigh(basis.T @ self.curvature @ basis)
+        return values, (basis @ vectors).T
+
+    def curvatures(self) -> Array:
+        """Return eigenvalues of the Lagrangian's Hessian along the face, ascending."""
+        return self._spectrum[0]
+
+    @property
+    def falling(self) -> Array:
+        """The directions along the face of negative curvature, ``(i, n)``."""
+        values, vectors = self._spectrum
+        return vectors[values < 0]
 
     def watched(self) -> tuple[Array, Array]:
         """Return what must not be negative along an arc ``(m + 3,)``, and its derivatives by x.
