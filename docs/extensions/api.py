@@ -80,7 +80,10 @@ GROUPS = (
     Group(
         "Follow equilibria",
         "Equilibria over a parameter, with the events at which they change, begin and end.",
-        {"branches": "branches Diagram Arc BranchEvent BranchKind"},
+        {
+            "branches": "branches Diagram Arc BranchEvent BranchKind hysteresis Hysteresis Leg "
+            "Jump",
+        },
     ),
     Group(
         "Prove and list",
@@ -196,7 +199,7 @@ GROUPS = (
         "Figures of sets, bodies and results.",
         {
             "pictures": "draw_region draw_arrangement draw_clusters draw_motion draw_packing "
-            "draw_critical draw_cells draw_barcode draw_landscape draw_landscape_map "
+            "draw_critical draw_cells draw_barcode draw_branches draw_landscape draw_landscape_map "
             "film MotionFilm film_route skeleton_page save save_motion",
         },
     ),

@@ -1,10 +1,12 @@
 """Diagrams of equilibria over a parameter: arcs, and the events at which they end."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 
 from polycorner import checks
 from polycorner.kinds import checked
@@ -14,7 +16,8 @@ from polycorner.minimisation.parametric import problem_with
 from polycorner.minimisation.problem import Problem
 from polycorner.printing import Printed, Sheet, listed, number
 from polycorner.spaces.manifold import Array
-from polycorner.values import Checked
+from polycorner.tolerances import DEFAULT
+from polycorner.values import Checked, cached_property
 
 
 class BranchKind(Enum):
@@ -95,14 +98,40 @@ class Arc(Checked):
     events: tuple[int, int]
 
     def at(self, value: float) -> Array:
-        """Return the point at a value of the parameter, by linear interpolation, ``(n,)``."""
-        columns = self.points.T
-        return np.array([np.interp(value, self.parameters, column) for column in columns])
+        """Return the point at a value of the parameter, by interpolation, ``(n,)``."""
+        curve = self.curve
+        t = curve(curve.x)[:, 0]
+        i = min(max(int(np.searchsorted(t, value)), 1), len(t) - 1)
+        low, high = curve.x[i - 1 : i + 1]
+        if not t[i - 1] < value < t[i]:
+            return np.array(curve(low if value <= t[i - 1] else high)[2:])
+        return np.array(curve(brentq(lambda s: float(curve(s)[0]) - value, low, high))[2:])
+
+    @cached_property
+    def curve(self) -> CubicSpline:
+        """Parameter, energy and point over the length of the arc."""
+        return spline(self.parameters, self.energies, self.points)
 
     @property
     def stable(self) -> bool:
         """Whether its points are strict minima, modulo continuous symmetries."""
         return self.index == 0
+
+
+def spline(parameters: Array, values: Array, points: Array) -> CubicSpline:
+    """Return parameters, values ``(k,)`` and points ``(k, n)`` over the length of a polyline.
+
+    In the lengths the parameter and each coordinate count in units of their ranges, so that the
+    spline is smooth also where the parameter turns.
+    """
+    columns = np.column_stack([parameters, points])
+    size, least = np.ptp(columns, axis=0), DEFAULT.alike * abs(points).max()
+    moved = size > np.append(0.0, np.full(points.shape[1], least))  # others are rounding
+    steps = np.linalg.norm(np.diff(columns[:, moved] / size[moved], axis=0), axis=1)
+    # Arcs have points twice where two courses meet.
+    apart = np.concatenate([[True], steps > DEFAULT.settled])
+    lengths = np.concatenate([[0.0], np.cumsum(steps)])
+    return CubicSpline(lengths[apart], np.column_stack([parameters, values, points])[apart])
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,12 +185,32 @@ class Diagram(Checked, Printed):
                 found.append(stationary_on(d, energy, arc.at(value), arc.active))
         return found
 
+    def values_at(self, value: float) -> dict[str, float]:
+        """Return the values of the formulas' parameters at a value of the parameter."""
+        moved, known = value - self.value, self.problem.parameter_values
+        return {name: next(iter(known[name])) + rate * moved for name, rate in self.rates.items()}
+
     def problem_at(self, value: float) -> Problem:
         """Return the problem at a value of the parameter."""
-        moved = value - self.value
-        known = self.problem.parameter_values
-        values = {name: next(iter(known[name])) + rate * moved for name, rate in self.rates.items()}
-        return problem_with(self.problem, values)
+        return problem_with(self.problem, self.values_at(value))
+
+    @checked
+    def named(self, parameter: str, value: float) -> "Diagram":
+        """Return the diagram over a parameter of another name, with a value at the problem.
+
+        As where a size changes several parameters of the formulas, of which a diagram tells the
+        change.
+        """
+        checks.real("value", value)
+        by = value - self.value
+        return replace(
+            self,
+            parameter=parameter,
+            value=value,
+            interval=(self.interval[0] + by, self.interval[1] + by),
+            arcs=tuple(replace(arc, parameters=arc.parameters + by) for arc in self.arcs),
+            events=tuple(replace(e, parameter=e.parameter + by) for e in self.events),
+        )
 
     def __repr__(self) -> str:
         """Return the numbers of arcs and events in one line."""

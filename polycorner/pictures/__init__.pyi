@@ -1,5 +1,6 @@
 from .arrangements import draw_arrangement
 from .barcodes import draw_barcode
+from .branches import draw_branches
 from .clusters import draw_clusters
 from .disks import draw_critical
 from .exports import save_motion
@@ -34,6 +35,7 @@ __all__ = [
     "components_of_complement",
     "draw_arrangement",
     "draw_barcode",
+    "draw_branches",
     "draw_cells",
     "draw_clusters",
     "draw_critical",

@@ -176,6 +176,7 @@ DUMBBELLS = {
         "points": [[0.0, 0.0, 3.0, 0.0]],
     },
     "pictures.draw_barcode": lambda: {"nerve": of.nerve()},
+    "pictures.draw_branches": lambda: {"diagram": of.diagram()},
     "pictures.draw_cells": lambda: {"proof": of.cell()},
     "pictures.draw_clusters": lambda: {"model": of.spheres(), "points": [of.tetrahedron()]},
     "pictures.draw_critical": lambda: {"model": of.disks(), "configurations": of.critical()},

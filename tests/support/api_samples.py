@@ -12,6 +12,7 @@ import sympy
 import polycorner as pc
 from polycorner import (
     bodies,
+    branches,
     dumbbells,
     files,
     landscapes,
@@ -34,6 +35,7 @@ STRETCH = sympy.Symbol("a")
 square = cache(lambda: pc.Polyhedron(M, {"left": X, "bottom": Y, "right": 1 - X, "top": 1 - Y}))
 energy = cache(lambda: pc.SmoothFunction("energy", STRETCH * X + Y, M, parameters={"a": 2.0}))
 certificate = cache(lambda: pc.certify(square(), energy(), [0.0, 0.0]))
+diagram = cache(lambda: branches.branches(certificate(), "a", (1.0, 3.0)))
 minima = cache(lambda: pc.minima(square(), energy(), starts=3, box=UNIT))
 skeleton = cache(lambda: pc.skeleton(square(), [[0.5, 0.5]]))
 

@@ -1,0 +1,83 @@
+"""Drawn diagrams: lines lie where equilibria are, marks where events are."""
+
+import numpy as np
+import pytest
+import sympy
+
+from polycorner import Manifold, Polyhedron, SmoothFunction, minimise
+from polycorner.branches import branches, hysteresis
+from polycorner.pictures import draw_branches, save
+
+M = Manifold.euclidean("x y")
+x, y = M.symbols
+t = sympy.Symbol("t")
+STOP = 0.8
+
+
+@pytest.fixture(scope="module")
+def diagram():
+    """A double well that leans, whose right half has a stop."""
+    well = SmoothFunction("E", x**4 / 4 - x**2 / 2 - t * x + y**2, M, parameters={"t": 0.0})
+    return branches(
+        minimise(Polyhedron(M, {"stop": STOP - x, "far": x + 9}), well, [-1, 0]), "t", (-0.6, 0.6)
+    )
+
+
+def drawn(axes, style=None):
+    lines = [line for line in axes.lines if line.get_marker() == "None"]
+    return [line for line in lines if style in (None, line.get_linestyle())]
+
+
+def test_lines_are_equilibria(diagram):
+    axes = draw_branches(diagram, "x").axes[0]
+    for line in drawn(axes):
+        s, place = line.get_data()
+        off = place**3 - place - s
+        assert (np.minimum(abs(off), abs(place - STOP)) < 1e-3).all()
+        stable = (3 * place**2 - 1 > -1e-3) | (abs(place - STOP) < 1e-6)
+        assert stable.all() == (line.get_linestyle() == "-")
+    assert len(drawn(axes)) == len(diagram.arcs)
+    colours = {line.get_color() for line in drawn(axes)}
+    assert len(colours) == len({arc.active for arc in diagram.arcs}) == 2
+
+
+def test_marks_are_events(diagram):
+    figure = draw_branches(diagram, "x", label="place", parameter="load")
+    (axes,) = figure.axes
+    marks = {line.get_data()[0][0] for line in axes.lines if line.get_marker() != "None"}
+    fold = 2 / 3**1.5
+    assert sorted(marks) == pytest.approx(sorted([-fold, STOP**3 - STOP, fold]))
+    told = {text.get_text() for text in figure.legends[0].get_texts()}
+    words = {"no contact", "stop", "minimum", "other equilibrium", "fold", "contact closes"}
+    assert told == words
+    assert [text.get_text() for text in axes.texts] == ["", "stop", ""]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("load", "place")
+
+
+def test_energies_and_functions(diagram):
+    by_default = draw_branches(diagram).axes[0]
+    assert by_default.get_ylabel() == "energy"
+    for line, arc in zip(drawn(by_default), diagram.arcs, strict=True):
+        np.testing.assert_allclose(line.get_ydata()[[0, -1]], arc.energies[[0, -1]], atol=1e-9)
+    squares = draw_branches(diagram, lambda q: q[0] ** 2).axes[0]
+    for line, arc in zip(drawn(squares), diagram.arcs, strict=True):
+        np.testing.assert_allclose(line.get_ydata()[[0, -1]], arc.points[[0, -1], 0] ** 2)
+
+
+def test_a_loop_has_an_arrow_for_each_fall(diagram, tmp_path):
+    loop = hysteresis(diagram)
+    figure = draw_branches(diagram, "x", loop=loop)
+    arrows = [text for text in figure.axes[0].texts if hasattr(text, "arrow_patch")]
+    ends = [text.xy for text in arrows if text.arrow_patch is not None]
+    expected = [(jump.parameter, jump.end[0]) for jump in loop.jumps]
+    np.testing.assert_allclose(ends, expected)
+    assert save(figure, tmp_path / "loop.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("of", "expected"),
+    [("z", "of: expected 'energy', 'x' or 'y'"), (lambda q: q, "of: expected a finite number")],
+)
+def test_what_is_drawn_is_checked(diagram, of, expected):
+    with pytest.raises((TypeError, ValueError), match=f"^{expected}"):
+        draw_branches(diagram, of)
