@@ -176,7 +176,7 @@ def test_threads_and_strips_go_around_the_box():
     for engine in engines:
         engine.advance(60)
     single, several = engines
-    strips, around = single.work.crowd.strips.tolist()
+    strips, around = single.work.crowd.strips[:2].tolist()
     assert around
     assert strips > 4
     assert strips % 2 == 0
