@@ -175,11 +175,11 @@ GROUPS = (
     ),
     Group(
         "Save and load",
-        "Problems, certificates, skeletons, landscapes, graphs and trajectories in files.",
+        "Problems, certificates, skeletons, landscapes, diagrams, graphs and trajectories in files.",
         {
             "files": "ProblemFile save_problem load_problem save_certificate load_certificate "
             "save_skeleton load_skeleton save_trajectory load_trajectory skeleton_graph "
-            "save_graph load_graph save_landscape load_landscape",
+            "save_graph load_graph save_landscape load_landscape save_diagram load_diagram",
         },
     ),
     Group(

@@ -24,7 +24,7 @@ from polycorner.branches.diagram import Arc, BranchEvent, BranchKind, Diagram, s
 from polycorner.branches.search import branches
 from polycorner.kinds import checked
 from polycorner.landscapes.basins import STRIDE
-from polycorner.landscapes.steepest import steepest
+from polycorner.landscapes.steepest import MOST, steepest
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.methods import minimise, stationary_on
 from polycorner.minimisation.parametric import lifted_problem
@@ -301,9 +301,11 @@ class _Way:
 
     def _descended(self, value: float, start: Array) -> Certificate:
         problem, point = self.diagram.problem_at(value), start
-        # Short steps first, while the slope is small and valleys are narrow.
-        for stride in (self.beyond * self.stride, self.stride):
-            point = [point, *steepest(problem, point, stride)][-1]
+        # Short steps first, while the slope is small and valleys are narrow: all those of one
+        # length together are as long as one of the next.
+        finer = math.sqrt(self.beyond)
+        for stride, most in ((finer**2, 1 / finer), (finer, 1 / finer), (1.0, MOST)):
+            point = [point, *steepest(problem, point, stride * self.stride, math.ceil(most))][-1]
         return minimise(problem.polyhedron, problem.energy, point)
 
     def _arc_of(self, found: Certificate, value: float) -> tuple[int, int] | None:

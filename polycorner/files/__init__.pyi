@@ -1,3 +1,4 @@
+from .branches import load_diagram, save_diagram
 from .certificates import load_certificate, save_certificate
 from .graphs import load_graph, save_graph, skeleton_graph
 from .landscapes import load_landscape, save_landscape
@@ -14,6 +15,7 @@ __all__ = [
     "ProblemFile",
     "Solid",
     "load_certificate",
+    "load_diagram",
     "load_graph",
     "load_landscape",
     "load_problem",
@@ -24,6 +26,7 @@ __all__ = [
     "read_particles",
     "read_urdf",
     "save_certificate",
+    "save_diagram",
     "save_graph",
     "save_landscape",
     "save_problem",

@@ -274,7 +274,8 @@ def lifted_problem(problem: Problem, names: Sequence[str]) -> Problem:
     extended = d.manifold * Manifold(tuple(names), (math.inf,) * len(names))
     functions = [_lifted(f, extended, frozenset(names)) for f in problem.functions]
     m = problem.inequalities
-    return pose(Polyhedron(extended, _tree(d.tree, functions[:m]), functions[m:-1]), functions[-1])
+    stated = functions[m : m + len(d.stated)]  # those that normalise vectors come with the manifold
+    return pose(Polyhedron(extended, _tree(d.tree, functions[:m]), stated), functions[-1])
 
 
 def problem_with(problem: Problem, values: Mapping[str, float]) -> Problem:

@@ -4,6 +4,7 @@ import signal
 
 import numpy as np
 import pytest
+from diagrams import leaning_well
 from discs import DISCS, START
 from forgeries import (
     Kept,
@@ -26,7 +27,7 @@ from proof_files import verdict
 from polycorner import Manifold, Polyhedron, files, minimise, simulate, skeleton
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.dynamics import files as run_files
-from polycorner.files import certificates, graphs, landscapes, skeletons, trajectories
+from polycorner.files import branches, certificates, graphs, landscapes, skeletons, trajectories
 from polycorner.models import textbook
 from polycorner.motion import Checkpoint, checkpoints
 from polycorner.proofs import stationary_points
@@ -64,6 +65,15 @@ def landscape(folder):
 
     path = files.save_landscape(double_well(), folder / "landscape")
     return Kept(path, forge_json(landscapes.KIND), read)
+
+
+def diagram(folder):
+    def read(path):
+        found = files.load_diagram(path)
+        return [(c.point.tolist(), c.verdict) for c in found.at(0.25)], found.closed
+
+    path = files.save_diagram(leaning_well(), folder / "diagram")
+    return Kept(path, forge_json(branches.KIND), read)
 
 
 def unfinished(folder):
@@ -128,7 +138,18 @@ def search(folder):
     return Kept(folder / "search", forge_search, go_on)
 
 
-KINDS = [certificate, atlas, landscape, unfinished, graph, trajectory, run, checkpoint, table]
+KINDS = [
+    certificate,
+    atlas,
+    landscape,
+    diagram,
+    unfinished,
+    graph,
+    trajectory,
+    run,
+    checkpoint,
+    table,
+]
 KINDS += [proof, search]
 
 

@@ -2,25 +2,15 @@
 
 import numpy as np
 import pytest
-import sympy
+from diagrams import STOP, leaning_well
 
-from polycorner import Manifold, Polyhedron, SmoothFunction, minimise
-from polycorner.branches import branches, hysteresis
+from polycorner.branches import hysteresis
 from polycorner.pictures import draw_branches, save
-
-M = Manifold.euclidean("x y")
-x, y = M.symbols
-t = sympy.Symbol("t")
-STOP = 0.8
 
 
 @pytest.fixture(scope="module")
 def diagram():
-    """A double well that leans, whose right half has a stop."""
-    well = SmoothFunction("E", x**4 / 4 - x**2 / 2 - t * x + y**2, M, parameters={"t": 0.0})
-    return branches(
-        minimise(Polyhedron(M, {"stop": STOP - x, "far": x + 9}), well, [-1, 0]), "t", (-0.6, 0.6)
-    )
+    return leaning_well()
 
 
 def drawn(axes, style=None):

@@ -448,6 +448,9 @@ CALLS = {
     "Tutorial.starts": lambda: {"rng": 0, "count": 2},
     # files
     "files.load_certificate": lambda: {"path": of.kept("certificate")},
+    "files.load_diagram": lambda: {
+        "path": files.save_diagram(of.diagram(), of.new("diagram.json"))
+    },
     "files.load_graph": lambda: {"path": of.kept("graph")},
     "files.load_landscape": lambda: {
         "path": files.save_landscape(double_well(), of.new("landscape.json"))
@@ -462,6 +465,7 @@ CALLS = {
     "files.read_mesh": lambda: {"path": of.mesh_file()},
     "files.load_trajectory": lambda: {"path": of.kept("trajectory"), "system": of.system()},
     "files.save_certificate": lambda: {"certificate": of.certificate(), "path": of.new("c.nc")},
+    "files.save_diagram": lambda: {"diagram": of.diagram(), "path": of.new("d.json")},
     "files.save_graph": lambda: {"skeleton": of.skeleton(), "path": of.new("g.graphml")},
     "files.save_landscape": lambda: {"landscape": double_well(), "path": of.new("l.json")},
     "files.save_problem": lambda: {
