@@ -112,7 +112,7 @@ def _leaving(here: FritzJohn, node: Node, *, also: bool) -> Iterator[Arm]:
         node.notes.append("something vanishes to second order")
         return
     for side in (1.0, -1.0):
-        away = values[:m].copy()
+        away = np.sign(values[:m])  # what does not vanish there is far, whatever its size
         away[weak] = side * rates[weak]
         held = list(here.face)
         pressed = (away[held] > 0).all() and (not also or side * rates[m] > 0)

@@ -325,6 +325,7 @@ class _Way:
             self.diagrams.append(new)
             known = self._known(found, value, len(self.diagrams) - 1)
             if known is None:
+                self.diagrams.pop()
                 self.note = "the minimum after the jump is not isolated, or its arc is not found"
         return known
 

@@ -389,7 +389,7 @@ def _diagram(
 ) -> Diagram:
     """Return arcs and events in terms of the user."""
     system, names = search.system, [f.name for f in search.system.problem.functions]
-    low, unit = interval[0], (interval[1] - interval[0]) / search.system.length
+    (low, high), length = interval, search.system.length
     # In an order that does not depend on the order in which they were found.
     kept = sorted(
         (k for k, edge in enumerate(search.edges) if edge.points),
@@ -415,7 +415,7 @@ def _diagram(
         arcs.append(
             Arc(
                 active=tuple(names[i] for i in edge.face),
-                parameters=np.array([low + p.s * unit for p in points]),
+                parameters=np.interp([p.s for p in points], (0, length), (low, high)),
                 points=np.array([system.place(p.u) for p in points]),
                 multipliers=certificate.problem.stated(stated),
                 energies=np.array([p.known.values[-1] for p in points]) * system.sizes[-1],
@@ -430,7 +430,7 @@ def _diagram(
         events.append(
             BranchEvent(
                 kind=kind_of(node),
-                parameter=low + node.at.s * unit,
+                parameter=float(np.interp(node.at.s, (0, length), (low, high))),
                 point=system.manifold.canonical(system.place(node.at.u)),
                 before=tuple(names[i] for i in arms[0].face),
                 after=tuple(names[i] for i in arms[-1].face),

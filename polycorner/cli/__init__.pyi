@@ -1,3 +1,4 @@
+from .branches import Vary, branch_options, followed, report_branches
 from .landscape import Telling, landscape_options, report_landscape, searched
 from .minima import report_minima, start_options
 from .options import (
@@ -39,6 +40,8 @@ __all__ = [
     "GroupedCommand",
     "SkeletonSearch",
     "Telling",
+    "Vary",
+    "branch_options",
     "columns",
     "command",
     "config_option",
@@ -46,6 +49,7 @@ __all__ = [
     "digits_option",
     "examples",
     "fail",
+    "followed",
     "from_file",
     "given",
     "json_text",
@@ -54,6 +58,7 @@ __all__ = [
     "output_options",
     "prepare",
     "remark",
+    "report_branches",
     "report_landscape",
     "report_minima",
     "search_options",

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from polycorner.cli.atlas import STARTS, planar, skeletal
+from polycorner.cli.branches import WORDS as FOLLOWING
+from polycorner.cli.branches import Vary, branch_options, followed, report_branches
 from polycorner.cli.landscape import (
     FLAGS,
     Telling,
@@ -147,15 +149,20 @@ def _chosen(problem: "ProblemFile", chosen: Sequence[str], file: Path) -> list[s
 def _interval(problem: "ProblemFile", written: str) -> tuple[str, tuple[float, float]]:
     name, _, sides = written.partition("=")
     low, _, high = sides.partition(":")
-    functions = [*problem.polyhedron.functions, *problem.polyhedron.stated, problem.energy]
-    known = {p for f in functions if f is not None for p in f.family.parameters}
-    if name not in known:
-        words = ", ".join(sorted(known)) or "none: parameters that vary are decimals in the file"
-        fail(f"--box: expected NAME=LOW:HIGH with one of the parameters {words}; got {written!r}")
+    _check_parameter(problem, "--box", name, written)
     try:
         return name, (float(low), float(high))
     except ValueError:
         fail(f"--box: expected two numbers, as in {name}=0.9:1.1; got {written!r}")
+
+
+def _check_parameter(problem: "ProblemFile", flag: str, name: str, written: str) -> None:
+    """End the command where no function of a problem has a parameter."""
+    functions = [*problem.polyhedron.functions, *problem.polyhedron.stated, problem.energy]
+    known = {p for f in functions if f is not None for p in f.family.parameters}
+    if name not in known:
+        words = ", ".join(sorted(known)) or "none: parameters that vary are decimals in the file"
+        fail(f"{flag}: expected NAME=LOW:HIGH with one of the parameters {words}; got {written!r}")
 
 
 def _judged(
@@ -377,6 +384,63 @@ def _boxes(problem: "ProblemFile", file: Path) -> dict[str, Any]:
         fail(f"{file}: coordinates: expected a box of {', '.join(missing)}, in which passes are"
              " listed, or --starts; got none")  # fmt: skip
     return box
+
+
+# ---------------------------------------------------------------------------------------- branches
+
+
+@command(epilog=examples("branches truss.toml --vary load=0:1.5", "branches truss.toml --help"))
+@with_problem
+@option(
+    "--point",
+    "chosen",
+    multiple=True,
+    metavar="NAME",
+    group="Parameter",
+    help="Points of the file from whose minima it begins; repeat for several. [all]",
+)
+@option(
+    "--of",
+    default="energy",
+    metavar="NAME",
+    group="Output",
+    help="Coordinate that the figure shows over the parameter, or energy.",
+)
+@branch_options
+def branches(
+    file: Path, chosen: tuple[str, ...], of: str, vary: Vary, limits: dict[str, Any], loop: bool,
+    as_json: bool, out: Path | None,
+) -> None:  # fmt: skip
+    """Follow the equilibria of the problem in FILE while a parameter of it varies.
+
+    Parameters that vary are decimals in the file; their values there are those at which it begins,
+    in the minima below the points of the file.
+    """
+    problem = read(file)
+    if problem.energy is None:
+        fail(f"{file}: energy: expected minimise or maximise; got none")
+    names = _chosen(problem, chosen, file)
+    _check_parameter(problem, "--vary", vary.name, f"{vary.name}={vary.low:g}:{vary.high:g}")
+    if of not in ("energy", *problem.polyhedron.manifold.names):
+        known = ", ".join(problem.polyhedron.manifold.names)
+        fail(f"--of: expected energy, or one of the coordinates {known}; got {of}")
+    prepare(out)
+    with working(FOLLOWING, "arcs") as progress:
+        from polycorner import minimise
+
+        d, starts = problem.polyhedron, []
+        for name in names:
+            try:
+                starts.append(minimise(d, problem.energy, problem.points[name]))
+            except ValueError as error:
+                fail(f"point {name}: {error}")
+        value = min(starts[0].problem.parameter_values[vary.name])
+        if not vary.low <= value <= vary.high:
+            fail(f"--vary: expected an interval that contains {value:g}, the value in {file}; got"
+                 f" {vary.low:g}:{vary.high:g}")  # fmt: skip
+        found = followed(starts, vary.name, vary[1:], progress=progress, **limits)
+    about = {"file": str(file)}
+    report_branches(file.stem, about, found, loop=loop, as_json=as_json, out=out, height=of)
 
 
 # -------------------------------------------------------------------------------------------- view

@@ -149,7 +149,7 @@ class _Drawing:
         end = int(np.argmin(abs(arc.parameters - event.parameter)))
         height = self.height(float(arc.energies[end]), arc.points[end])
         style: dict[str, Any] = {"ms": 7, "mfc": "white", "mec": MARK, "mew": 1.3, "zorder": 5}
-        self.axes.plot(event.parameter, height, MARKS[event.kind][0], **style)
+        self.axes.plot(event.parameter, height, marker=MARKS[event.kind][0], **style)
         self.kinds.add(event.kind)
         self.marks[event.parameter, height] = ", ".join(event.functions)
 
@@ -165,7 +165,8 @@ class _Drawing:
             )
             arrow = {"arrowstyle": "-|>", "color": FALL, "lw": 1.6, "shrinkA": 4, "shrinkB": 1}
             self.axes.annotate("", end, start, arrowprops=arrow, zorder=4)
-            self.curves.append(np.linspace(start, end, 50))
+            self.axes.update_datalim([start, end])
+            self.curves.append(np.linspace(start, end, SAMPLES**2))
         self.loop = True
 
     def legend(self) -> list[Artist]:
@@ -204,7 +205,7 @@ class _Drawing:
                     ha=ALIGNED[dx][0], va=ALIGNED[dy][1], fontsize=FONT, zorder=6,
                 )  # fmt: skip
                 box = text.get_window_extent()
-                hidden = sum(map(box.contains, *curves.T))
+                hidden = sum(map(box.padded(GAP).contains, *curves.T))
                 out = not all(map(inside.contains, *box.corners().T))
                 tried.append((out or box.count_overlaps(taken), hidden, len(tried), text, box))
             blocked, *_, chosen, box = min(tried)

@@ -18,7 +18,8 @@ from polycorner.cli import main as entry
 from polycorner.cli.main import EXIT_CODES, cli
 
 ROOT = Path(entry.__file__).parents[2]
-ELSEWHERE = {"completion", "landscape", "sweep", "verify", "view"}  # tested in files of their own
+# Tested in files of their own.
+ELSEWHERE = {"branches", "completion", "landscape", "sweep", "verify", "view"}
 NO_SEED = {"cache", "dyad", "prove", "paper"}  # nothing random in them
 
 

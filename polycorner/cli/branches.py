@@ -1,0 +1,201 @@
+"""``polycorner branches``: equilibria over a parameter, and the events at which they change."""
+
+from collections.abc import Callable, Mapping
+from functools import wraps
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from polycorner.cli.lazy import LazyGroup
+from polycorner.cli.options import examples, option, output_options
+from polycorner.cli.output import deliver, fail, shown, timed, write_answer, writing
+
+if TYPE_CHECKING:
+    from polycorner.branches import Diagram, Hysteresis
+    from polycorner.minimisation import Certificate
+    from polycorner.pictures.branches import Height
+    from polycorner.polyhedra.symmetry import Symmetry
+
+WORDS = "following equilibria"
+FLAGS = {"interval": "--vary", "parameters": "--vary", "certificate": "start"}
+
+
+class Vary(NamedTuple):
+    """A parameter and the interval in which it varies."""
+
+    name: str
+    low: float
+    high: float
+
+
+@click.group(
+    cls=LazyGroup,
+    prefix="branches.",
+    epilog=examples("branches dyad --vary rod=2:2.95", "branches FILE.toml --vary load=0:1.5"),
+    no_args_is_help=True,
+)
+def branches() -> None:
+    """Follow equilibria of a model over a parameter, through all events."""
+
+
+def branch_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Add ``--vary``, ``--loop``, ``--max-arcs``, ``--seconds`` and the options of every answer.
+
+    The command gets ``--vary`` as a :class:`Vary`, and the last two as ``limits``: those that were
+    given, as arguments of :func:`polycorner.branches.branches`.
+    """
+
+    @wraps(function)
+    def command(vary: str, max_arcs: int | None, seconds: float | None, **own: Any) -> None:
+        given = {"max_arcs": max_arcs, "max_seconds": seconds}
+        limits = {name: value for name, value in given.items() if value is not None}
+        function(vary=read_vary(vary), limits=limits, **own)
+
+    for add in (
+        output_options,
+        option(
+            "--seconds", type=click.FloatRange(min=0, min_open=True), group="Search",
+            metavar="S", help="Most seconds; what they leave open is said.",
+        ),
+        option(
+            "--max-arcs", type=click.IntRange(min=1), group="Search",
+            help="Most arcs. [that of the library]",
+        ),
+        option(
+            "--loop", is_flag=True, group="Parameter",
+            help="Follow a quasi-static system from LOW to HIGH and back, too.",
+        ),
+        option(
+            "--vary", required=True, metavar="NAME=LOW:HIGH", group="Parameter",
+            help="The parameter, and the interval that is covered.",
+        ),
+    ):  # fmt: skip
+        command = add(command)
+    return command
+
+
+def read_vary(written: str) -> Vary:
+    """Return the parameter and the interval of ``--vary``, or end the command."""
+    name, _, sides = written.partition("=")
+    parts = sides.split(":")
+    try:
+        low, high = map(float, parts)
+    except ValueError:
+        fail(f"--vary: expected NAME=LOW:HIGH with two numbers, as in rod=2:2.95; got {written!r}")
+    if not (name and isfinite(low) and isfinite(high) and low < high):
+        fail(f"--vary: expected NAME=LOW:HIGH with LOW less than HIGH; got {written!r}")
+    return Vary(name.strip(), low, high)
+
+
+def followed(certificates: "list[Certificate]", parameter: Any, *args: Any, **options: Any) -> Any:
+    """Return the diagram of equilibria, or end the command with what is wrong."""
+    from polycorner.branches import branches as follow
+
+    try:
+        return follow(certificates, parameter, *args, **options)
+    except ValueError as error:
+        argument, _, rest = str(error).partition(":")
+        fail(f"{FLAGS.get(argument, argument)}:{rest}")
+
+
+def report_branches(  # noqa: PLR0913 - what is told, and how
+    model: str,
+    chosen: Mapping[str, Any],
+    found: "Diagram",
+    *,
+    loop: bool,
+    as_json: bool,
+    out: Path | None,
+    symmetry: "Symmetry | None" = None,
+    height: "Height" = "",
+    label: str = "",
+) -> None:
+    """Print a diagram and write its files: the answer, the diagram itself and the figure.
+
+    ``height`` and ``label`` are those of :func:`~polycorner.pictures.draw_branches`.
+    """
+    from polycorner.branches import hysteresis
+
+    way = None
+    if loop:
+        with timed("following the loop"):
+            try:
+                way = hysteresis(found, symmetry=symmetry)
+            except ValueError as error:
+                fail(f"--loop: {str(error).removeprefix('path: ')}")
+    answer = {
+        "model": model,
+        "parameters": dict(chosen),
+        "vary": {"name": found.parameter, "from": found.interval[0], "to": found.interval[1]},
+        "energy_unit": found.problem.energy.unit,
+        "closed": found.closed,
+        "arcs": [
+            {
+                found.parameter: arc.parameters.tolist(),
+                "active": list(arc.active),
+                "index": arc.index,
+                "stable": arc.stable,
+                "events": list(arc.events),
+                "energies": arc.energies.tolist(),
+                "multipliers": {name: lam.tolist() for name, lam in arc.multipliers.items()},
+                "points": arc.points.tolist(),
+            }
+            for arc in found.arcs
+        ],
+        "events": [
+            {
+                found.parameter: event.parameter,
+                "kind": event.kind.name.lower(),
+                "functions": list(event.functions),
+                "before": list(event.before),
+                "after": list(event.after),
+                "index": [found.arcs[k].index for k in event.arcs],
+                "arcs": list(event.arcs),
+                "point": event.point.tolist(),
+                "note": event.note,
+            }
+            for event in found.events
+        ],
+    }
+    if way is not None:
+        answer["loop"] = _loop(way)
+
+    def write() -> list[Path]:
+        if out is None:
+            return []
+        from polycorner.files import save_diagram
+        from polycorner.pictures import draw_branches, save
+
+        with writing(out), timed("drawing"):
+            figure = draw_branches(found, height, label=label, loop=way)
+            return [
+                write_answer(answer, out, "branches.json"),
+                save_diagram(found, out / "saved_branches.json"),
+                save(figure, out / "branches.png"),
+            ]
+
+    sheets = [found.sheet, *([] if way is None else [way.sheet])]
+    deliver(answer, lambda: "\n\n".join(map(shown, sheets)), write, as_json=as_json)
+
+
+def _loop(way: "Hysteresis") -> dict[str, Any]:
+    return {
+        "closed": way.closed,
+        "work": way.work,
+        "released": way.released,
+        "jumps": [
+            {
+                way.diagrams[0].parameter: jump.parameter,
+                "kind": jump.kind.name.lower(),
+                "before": list(jump.before),
+                "after": list(jump.after),
+                "start": jump.start.tolist(),
+                "end": jump.end.tolist(),
+                "released": jump.released,
+            }
+            for jump in way.jumps
+        ],
+        "note": way.note,
+    }
