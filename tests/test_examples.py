@@ -41,6 +41,7 @@ from examples import (
     ex30_clusters_of_atoms,
     ex31_landscape,
     ex32_silo,
+    ex33_snap_through,
     ex34_two_link_arm,
     ex35_slider_crank,
 )
@@ -396,6 +397,19 @@ def test_a_ball_leaves_its_pocket_over_the_tip_of_a_wedge(tmp_path):
     assert [path.stat().st_size > 10_000 for path in ex31_landscape.draw(found, tmp_path)]
     film = ex31_landscape.film(found, tmp_path / "way.gif", frames=3)
     assert film.read_bytes()[:3] == b"GIF"
+
+
+def test_a_truss_snaps_through_and_back(tmp_path):
+    """On the axis the load ``2 k y (L/sqrt(1 + y^2) - 1)`` has its maximum where it folds."""
+    loop = ex33_snap_through.main()
+    length = float(ex33_snap_through.LENGTH)
+    y = np.sqrt(length ** (2 / 3) - 1)
+    load = 2 * ex33_snap_through.STIFFNESS * y * (length / np.sqrt(1 + y**2) - 1)
+    assert [jump.parameter for jump in loop.jumps] == pytest.approx([load, -load])
+    assert loop.jumps[0].after == ("stop",)
+    assert loop.closed
+    assert loop.work == pytest.approx(loop.released, rel=1e-6)
+    assert all(path.stat().st_size > 10_000 for path in ex33_snap_through.draw(loop, tmp_path))
 
 
 def test_two_link_arm():
