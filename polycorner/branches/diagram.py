@@ -97,8 +97,10 @@ class Arc(Checked):
     index: int
     events: tuple[int, int]
 
+    @checked
     def at(self, value: float) -> Array:
         """Return the point at a value of the parameter, by interpolation, ``(n,)``."""
+        checks.real("value", value)
         curve = self.curve
         t = curve(curve.x)[:, 0]
         i = min(max(int(np.searchsorted(t, value)), 1), len(t) - 1)
@@ -185,11 +187,13 @@ class Diagram(Checked, Printed):
                 found.append(stationary_on(d, energy, arc.at(value), arc.active))
         return found
 
+    @checked
     def values_at(self, value: float) -> dict[str, float]:
         """Return the values of the formulas' parameters at a value of the parameter."""
-        moved, known = value - self.value, self.problem.parameter_values
+        moved, known = checks.real("value", value) - self.value, self.problem.parameter_values
         return {name: next(iter(known[name])) + rate * moved for name, rate in self.rates.items()}
 
+    @checked
     def problem_at(self, value: float) -> Problem:
         """Return the problem at a value of the parameter."""
         return problem_with(self.problem, self.values_at(value))
