@@ -175,7 +175,7 @@ GROUPS = (
     ),
     Group(
         "Save and load",
-        "Problems, certificates, skeletons, landscapes, diagrams, graphs and trajectories in files.",
+        "Problems, certificates, skeletons, landscapes, diagrams, graphs, trajectories in files.",
         {
             "files": "ProblemFile save_problem load_problem save_certificate load_certificate "
             "save_skeleton load_skeleton save_trajectory load_trajectory skeleton_graph "

@@ -23,7 +23,6 @@ from polycorner import checks
 from polycorner.branches.diagram import Arc, BranchEvent, BranchKind, Diagram, spline
 from polycorner.branches.search import branches
 from polycorner.kinds import checked
-from polycorner.landscapes.basins import STRIDE
 from polycorner.landscapes.steepest import MOST, steepest
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.methods import minimise, stationary_on
@@ -305,7 +304,8 @@ class _Way:
         # length together are as long as one of the next.
         finer = math.sqrt(self.beyond)
         for stride, most in ((finer**2, 1 / finer), (finer, 1 / finer), (1.0, MOST)):
-            point = [point, *steepest(problem, point, stride * self.stride, math.ceil(most))][-1]
+            way = steepest(problem, point, stride * self.stride, math.ceil(most), whole=True)
+            point = [point, *way][-1]
         return minimise(problem.polyhedron, problem.energy, point)
 
     def _arc_of(self, found: Certificate, value: float) -> tuple[int, int] | None:
@@ -348,7 +348,7 @@ def hysteresis(  # noqa: PLR0913 - keywords of one way
     start: ArrayLike | None = None,
     symmetry: Symmetry | None = None,
     beyond: float = 1e-4,
-    stride: float = STRIDE,
+    stride: float = 0.02,
     between: int = 3,
     extent: float = math.inf,
     options: WalkOptions | None = None,

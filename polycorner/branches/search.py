@@ -260,6 +260,8 @@ def branches(  # noqa: PLR0913 - keywords of one search
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     checks.whole("max_arcs", max_arcs, least=1)
     rates = {parameter: 1.0} if isinstance(parameter, str) else dict(parameter)
+    if not rates:
+        checks.refuse("parameter", "a name, or names with rates", parameter)
     system = _system(several[0], rates, (low, high), parameter, symmetry or Symmetry())
     search = _BranchSearch(system, options or WalkOptions(), extent)
     for one in several:
@@ -317,7 +319,11 @@ def _system(
         tolerances=certificate.tolerances,
     )
     known = system.at(q / problem.scales, (now - low) / (high - low) * UNITS)
-    sizes = np.linalg.norm(known.gradients, axis=1) + np.linalg.norm(known.hessians, axis=(1, 2))
+    first, second = (np.linalg.norm(d.reshape(len(d), -1), axis=1) for d in known[1:])
+    # The curvature of a distance of parallel segments is none by which to measure it.
+    level = np.append(abs(known.values[:-1]) + first[:-1], math.inf)
+    bent = level <= certificate.tolerances.zero * second
+    sizes = first + np.where(bent, second, np.minimum(second, level))
     return replace(system, sizes=np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0))
 
 

@@ -19,7 +19,13 @@ if TYPE_CHECKING:
     from polycorner.polyhedra.symmetry import Symmetry
 
 WORDS = "following equilibria"
-FLAGS = {"interval": "--vary", "parameters": "--vary", "certificate": "start"}
+FLAGS = {
+    "interval": "--vary",
+    "parameters": "--vary",
+    "certificate": "start",
+    "max_arcs": "--max-arcs",
+    "max_seconds": "--seconds",
+}
 
 
 class Vary(NamedTuple):

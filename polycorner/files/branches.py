@@ -138,11 +138,24 @@ def load_diagram(
         chosen = own if polyhedron is None else polyhedron
         differs = mismatch(content["problem"], chosen)
         if not differs:
-            diagram = _read(content, pose(chosen, its if energy is None else energy))
+            problem = pose(chosen, its if energy is None else energy)
+            differs = _lacking(content, problem)
+        if not differs:
+            diagram = _read(content, problem)
             differs = next(_differences(diagram), "")
     if differs:
         raise KIND.refusal(path, f"is of another polyhedron or energy: {differs}")
     return diagram
+
+
+def _lacking(content: Entries, problem: Problem) -> str:
+    """Return which parameters a problem has not, or nothing."""
+    rates = entries({"rates": mapped(text, real())})("", content)["rates"]
+    written = ", ".join(rates) or "none"
+    found = [name for name, values in problem.parameter_values.items() if len(values) == 1]
+    if rates and rates.keys() <= {*found}:
+        return ""
+    return f"parameters with one value: written {written}, found {', '.join(found) or 'none'}"
 
 
 def _read(content: Entries, problem: Problem) -> Diagram:
@@ -155,7 +168,6 @@ def _read(content: Entries, problem: Problem) -> Diagram:
     header: Entries = entries(
         {"rates": mapped(text, real()), "value": real(), "interval": row(real(), real())}
     )("", content)
-    problem.check_parameters(header["rates"])
     low, high = header["interval"]
     if not low < high:
         checks.refuse("interval", "two ascending numbers", [low, high])

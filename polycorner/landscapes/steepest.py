@@ -49,10 +49,19 @@ class Slope:
             return [frozenset(range(m))]
         return d.selections(self.away[:m].tolist(), DEFAULT.same)
 
-    def way(self, length: float) -> tuple[Array, Piece]:
-        """Return the step that leads down farthest, and the branch in which it does."""
+    def way(self, length: float, *, whole: bool = False) -> tuple[Array, Piece]:
+        """Return the step that leads down farthest, and the branch in which it does.
+
+        Where the energy presses on walls it is shorter than ``length``, unless the ``whole`` length
+        is asked for, and the energy does slope along them.
+        """
         ways = [(self._allowed(sorted(piece), length), piece) for piece in self.pieces]
-        return max(ways, key=lambda way: float(way[0] @ self.downhill))
+        step, piece = max(ways, key=lambda way: float(way[0] @ self.downhill))
+        size = float(np.linalg.norm(step))
+        if whole and DEFAULT.same * length < size < length:
+            step = self._allowed(sorted(piece), length * length / size)
+            step *= min(1.0, length / float(np.linalg.norm(step)))
+        return step, piece
 
     def _allowed(self, piece: list[int], length: float) -> Array:
         """Return the step nearest to the downhill one that is allowed; no step if none is."""
@@ -68,32 +77,36 @@ class Slope:
         return 0 * free if more is None else free + more
 
 
-def steepest(problem: Problem, start: Array, stride: float, most: int = MOST) -> list[Array]:
+def steepest(
+    problem: Problem, start: Array, stride: float, most: int = MOST, *, whole: bool = False
+) -> list[Array]:
     """Return the points of a steepest descent, until it stalls near a stationary point.
 
     The first is the start, or a point of the set nearby; there are none if the set is not reached.
-    Energies decrease.  No step is longer than ``stride``, in scale units.
+    Energies decrease.  No step is longer than ``stride``, in scale units.  It stalls, too, where
+    the energy slopes along walls a hundred times less than into them, unless ``whole`` steps are
+    asked for, which are as long there.
     """
     inside = _inside(problem, start)
     if inside is None:
         return []
     here = Slope.at(problem, inside)
     points, step = [here.point], stride
-    way, piece = here.way(step)
+    way, piece = here.way(step, whole=whole)
     while len(points) < most and step > FINEST * stride:
         if not np.linalg.norm(way) > FINEST * step:
             break
         reached, point = problem.restore(piece, here.point + way * problem.scales)
         there = Slope.at(problem, point)
-        onward = there.way(step)
+        onward = there.way(step, whole=whole)
         # A reversed direction means that a valley was stepped over.
         if reached and there.height < here.height and way @ onward[0] >= 0:
             here, last, step = there, step, min(GROWTH * step, stride)
             points.append(point)
-            way, piece = onward if step == last else here.way(step)
+            way, piece = onward if step == last else here.way(step, whole=whole)
         else:
             step /= 2
-            way, piece = here.way(step)
+            way, piece = here.way(step, whole=whole)
     return points
 
 

@@ -163,3 +163,26 @@ def test_paths_are_checked(path):
     d = diagram(FAR, WELL, [-1.0], -0.6, (-0.6, 0.6))
     with pytest.raises((ValueError, TypeError), match=r"^path: expected"):
         hysteresis(d, path)
+
+
+@pytest.mark.parametrize("seed", [23, 25])
+def test_a_fall_along_walls_ends_where_the_projected_flow_does(seed):
+    """In a box the flow is projected by clipping; some wells along the walls are shallow."""
+    u, v = PLANE.symbols
+    a, b, c = np.random.default_rng(seed).normal(size=(3, 3))
+    energy = sum(a[k] * sympy.cos(3 * u + 4 * b[k] * v + c[k]) for k in range(3)) - 3 * t * (u + v)
+    box = {"west": u + 1, "east": 1 - u, "south": v + 1, "north": 1 - v}
+    loop = hysteresis(diagram(box, energy, [-1.0, -1.0], -2.0, (-2.0, 2.0), PLANE))
+    slope = sympy.lambdify((u, v, t), [sympy.diff(-energy, q) for q in (u, v)], "math")
+    ends = {
+        leg.parameters[-1]: np.sign(leg.parameters[-1] - leg.parameters[0]) for leg in loop.legs
+    }
+    assert len(loop.jumps) > 5
+    for jump in loop.jumps:
+        q, beyond = jump.start, jump.parameter + 4e-4 * ends[jump.parameter]
+        for _ in range(20_000):
+            down = slope(*q, beyond)
+            q = [min(max(x + 2e-3 * s, -1), 1) for x, s in zip(q, down, strict=True)]
+        np.testing.assert_allclose(jump.end, q, atol=5e-3)
+    assert loop.closed
+    assert loop.work == pytest.approx(loop.released, rel=1e-6)

@@ -83,3 +83,13 @@ def test_arcs_of_a_pitchfork():
         np.testing.assert_allclose(arc.energies, -abs(side) * s**2 / 4, atol=1e-12)
     assert [len(d.at(s)) for s in (-0.5, 0.5)] == [3, 1]
     assert sorted(c.verdict.name for c in d.at(-0.5)) == ["SADDLE", *["STRICT_MINIMUM"] * 2]
+
+
+def test_arcs_are_interpolated_up_to_their_folds():
+    """Where ``x = +-sqrt(t)``, so that neither branch is taken for the other."""
+    functions, energy, start, value, *_ = CASES["fold"]
+    d = diagram(functions, energy, start, value)
+    for s in (1e-6, 1e-4, 0.01, 0.3):
+        places = sorted(float(arc.at(s)[0]) for arc in d.arcs)
+        np.testing.assert_allclose(places, [-np.sqrt(s), np.sqrt(s)], rtol=2e-3, atol=5e-4)
+        assert sorted(c.verdict.name for c in d.at(s)) == ["SADDLE", "STRICT_MINIMUM"]

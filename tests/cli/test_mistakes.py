@@ -8,6 +8,7 @@ from click.types import FloatParamType, IntParamType
 from polycorner.cli.main import cli
 
 NEEDED = {
+    "branches dyad": ("--vary", "rod=2:2.01"),
     "completion": ("bash",),
     "sweep": ("heading",),
     "verify": ("no.zip",),
@@ -22,6 +23,7 @@ WRONG = {
 UNBOUNDED = {
     "--seed",
     "--budget",
+    "--max-arcs",
     "--max-boxes",
     "--starts",
     "--workers",

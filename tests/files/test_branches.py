@@ -80,7 +80,7 @@ DAMAGES = [
     (lambda c: c.pop("arcs"), "arcs"),
     (lambda c: c.update(problem=[]), "problem"),
     (lambda c: c.update(rates={"s": 1.0}), "parameters"),
-    (lambda c: c.update(rates={}), "names: expected at least one"),
+    (lambda c: c.update(rates={}), "parameters with one value: written none, found t"),
     (lambda c: c.update(interval=[0.6, -0.6]), "interval"),
     (lambda c: c.update(value=0.1), r"arcs\[0\]"),
     (lambda c: c.update(closed=1), "closed"),

@@ -51,16 +51,17 @@ def dyad(
     if name not in RATES:
         known = ", ".join(key.replace("_", "-") for key in RATES)
         fail(f"--vary: expected one of {known}; got {vary.name!r}")
-    value = options[name]
+    value, flag = options[name], f"--{name.replace('_', '-')}"
     if not vary.low <= value <= vary.high:
         if given(name) or from_file(name):
-            flag = f"--{name.replace('_', '-')}"
             fail(f"{flag}: expected a value from {vary.low:g} to {vary.high:g}; got {value:g}")
         value = vary.low
     for end in (vary.low, vary.high):
         try:
             chosen_pair(options | {name: end})
         except click.UsageError as error:
+            if not error.message.startswith(f"{flag}:"):
+                raise
             fail(f"--vary: {error.message.removeprefix('--')}")
     pair = chosen_pair(options | {name: value})
     prepare(out)
