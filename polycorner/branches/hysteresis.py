@@ -31,6 +31,7 @@ from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, listed, number
+from polycorner.progress import Progress, silent
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, cached_property
@@ -182,6 +183,7 @@ class _Way:
     options: WalkOptions | None
     extent: float
     between: int
+    progress: Progress
     lifted: Problem
     k: int = 0
     j: int = 0
@@ -230,6 +232,7 @@ class _Way:
         energies, forces = np.array(told).T
         active = self.arc.active
         self.legs.append(Leg(self.k, self.j, active, parameters, points, energies, forces))
+        self.progress(len(self.legs), None, f"{self.diagram.parameter} = {value:g}")
 
     def _told(self, value: float, point: Array) -> tuple[float, float]:
         """Return the energy of a point of the arc, and its derivative along the arc."""
@@ -352,6 +355,7 @@ def hysteresis(  # noqa: PLR0913 - keywords of one way
     between: int = 3,
     extent: float = math.inf,
     options: WalkOptions | None = None,
+    progress: Progress = silent,
 ) -> Hysteresis:
     """Follow a quasi-static system as the parameter goes through given values, up and down.
 
@@ -382,6 +386,8 @@ def hysteresis(  # noqa: PLR0913 - keywords of one way
         Points of a leg between each two of its arc, which make :attr:`Hysteresis.work` exact.
     extent, options : optional
         As for :func:`branches`.
+    progress : callable, optional
+        Told the number of legs, and the value of the parameter.
 
     Returns
     -------
@@ -416,7 +422,7 @@ def hysteresis(  # noqa: PLR0913 - keywords of one way
     checks.whole("between", between, least=0)
     lifted = lifted_problem(diagram.problem, tuple(diagram.rates))
     chosen = symmetry or Symmetry()
-    way = _Way([diagram], chosen, beyond, stride, options, extent, between, lifted)
+    way = _Way([diagram], chosen, beyond, stride, options, extent, between, progress, lifted)
     way.stand(0, _first(way, values[0], start), values[0])
     first = way.j, way.point
     done = all(way.move(value) for value in values[1:])

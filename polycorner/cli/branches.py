@@ -10,7 +10,7 @@ import click
 
 from polycorner.cli.lazy import LazyGroup
 from polycorner.cli.options import examples, option, output_options
-from polycorner.cli.output import deliver, fail, shown, timed, write_answer, writing
+from polycorner.cli.output import deliver, fail, shown, timed, working, write_answer, writing
 
 if TYPE_CHECKING:
     from polycorner.branches import Diagram, Hysteresis
@@ -126,9 +126,9 @@ def report_branches(  # noqa: PLR0913 - what is told, and how
 
     way = None
     if loop:
-        with timed("following the loop"):
+        with working("following the loop", "legs") as progress:
             try:
-                way = hysteresis(found, symmetry=symmetry)
+                way = hysteresis(found, symmetry=symmetry, progress=progress)
             except ValueError as error:
                 fail(f"--loop: {str(error).removeprefix('path: ')}")
     answer = {
