@@ -16,7 +16,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from polycorner import minimise, skeleton
+from polycorner import Manifold, Polyhedron, minimise, skeleton
 from polycorner.dumbbells import (
     DumbbellPair,
     RelativePlacements,
@@ -46,8 +46,9 @@ from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.dumbbells.viewer import descent, film_page, live_application, serve, write_page
 from polycorner.dumbbells.viewer.server import bound
 from polycorner.landscapes import landscape
-from polycorner.models import Tutorial
-from polycorner.pictures import draw_landscape, draw_region, save
+from polycorner.measures import SampleOptions, Weighting, measure, sample
+from polycorner.models import SphereCluster, Tutorial
+from polycorner.pictures import draw_clusters, draw_landscape, draw_region, save
 from polycorner.skeletons.search import traced
 
 IMAGES = Path(__file__).parent / "images"
@@ -119,6 +120,41 @@ def tutorial() -> None:
     edges = [traced(found, edge) for edge in found.edges]
     drawn = draw_region(region.polyhedron, (-3.6, 3.8, -3, 3.3), corners=corners, edges=edges)
     save(drawn, _png("tutorial"))
+
+
+def measures() -> None:
+    """Draw points on the strata of a parabola with a lid, and how often clusters are seen."""
+    M = Manifold.euclidean("x y")
+    x, y = M.symbols
+    region = Polyhedron(M, {"parabola": y - x**2, "lid": 2 - y})
+    options = SampleOptions(step=0.9, sideways=0.3, reach=0.7, every=20)
+    found = sample(
+        region, [[0.0, 1.0]], 4000, weighting=Weighting(gradients=False), rng=1, options=options
+    )
+    figure = Figure(figsize=(5.2, 3.4), layout="constrained")
+    axes = figure.subplots()
+    colours = {0: "#BBBBBB", 1: "#0072B2", 2: "#D55E00"}
+    words = {0: "area", 1: "edges", 2: "corners"}
+    for count, colour in colours.items():
+        points = found.points[found.contacts == count]
+        share = 100 * found.fraction(contacts=count).value
+        sizes = (3, 3, 40)[count]
+        axes.scatter(
+            *points.T, s=sizes, color=colour, label=f"{words[count]}: {share:.0f} %", zorder=count
+        )
+    axes.set_aspect("equal")
+    axes.set_ylim(-0.1, 2.4)
+    axes.legend(frameon=False, ncols=3, loc="upper center", fontsize="small")
+    axes.set_axis_off()
+    save(figure, _png("measures"))
+    seven = SphereCluster(7)
+    weighed = measure(
+        skeleton(seven.polyhedron, seven.starts(), symmetry=seven.symmetry), edges=False
+    )
+    order = np.argsort(-weighed.probabilities)
+    points = np.array([weighed.skeleton.corners[k].point for k in order])
+    labels = [f"{100 * weighed.probabilities[k]:.3g} %" for k in order]
+    save(draw_clusters(seven, points, labels=labels), _png("cluster_shares"))
 
 
 def viewer() -> None:
@@ -229,6 +265,7 @@ DRAWN = {
         collisions,
         dyad_landscape,
         tutorial,
+        measures,
         viewer,
         viewer_film,
         drum_bunch,

@@ -44,6 +44,7 @@ from examples import (
     ex33_snap_through,
     ex34_two_link_arm,
     ex35_slider_crank,
+    ex36_sticky_clusters,
 )
 from polycorner import Verdict, stratum_at
 from polycorner.minimisation import Mobility
@@ -140,6 +141,14 @@ def test_clusters_of_atoms(tmp_path):
     found = ex30_clusters_of_atoms.main()
     assert found.depth(1)[1] == pytest.approx(0.2239, abs=1e-4)
     picture = ex30_clusters_of_atoms.draw(found, tmp_path / "atoms.png")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_sticky_clusters(tmp_path):
+    measured, between = ex36_sticky_clusters.main()
+    assert sorted(measured.probabilities) == pytest.approx([0.04, 0.96])
+    assert between.passage_times([1])[1] == 0
+    picture = ex36_sticky_clusters.draw(measured, tmp_path / "clusters.png")
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

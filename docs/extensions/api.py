@@ -86,6 +86,14 @@ GROUPS = (
         },
     ),
     Group(
+        "Weigh strata",
+        "How often corners, edges and faces are seen; points of them; rates between corners.",
+        {
+            "measures": "measure Weighting StrataMeasures sample SampleOptions StrataSample "
+            "Estimate face_weights FaceWeights rates TransitionRates volume Volume",
+        },
+    ),
+    Group(
         "Prove and list",
         "Theorems in ball arithmetic: of points, minima, all stationary points, all corners.",
         {

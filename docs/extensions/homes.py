@@ -19,6 +19,7 @@ ROOMS = (
     "polycorner.proofs",
     "polycorner.landscapes",
     "polycorner.branches",
+    "polycorner.measures",
     "polycorner.motion",
     "polycorner.bodies",
     "polycorner.models",

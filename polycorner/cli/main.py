@@ -25,11 +25,14 @@ EXIT_CODES = {
     INTERRUPTED: "interrupted; the message says whether results were kept",
     BROKEN_PIPE: "broken pipe",
 }
-NAMES = ("atlas", "branches", "cache", "landscape", "minima", "sweep", "verify")
+NAMES = ("atlas", "branches", "cache", "landscape", "measure", "minima", "sweep", "verify")
 COMMANDS = {name: f"polycorner.cli.{name}:{name}" for name in NAMES}
 OF_FILES = {
-    n: f"polycorner.cli.problems:{n}"
-    for n in ("atlas", "branches", "landscape", "minima", "prove", "view")
+    "measure": "polycorner.cli.measure:measure_file",
+    **{
+        n: f"polycorner.cli.problems:{n}"
+        for n in ("atlas", "branches", "landscape", "minima", "prove", "view")
+    },
 }
 EXAMPLES = examples(
     "dyad",
@@ -41,8 +44,8 @@ UNITS = """
 Lengths are in mm, times in s.  Angles on the command line and in tables are in degrees; in JSON the
 keys of angles in degrees end in _deg, all other angles are in radians.
 
-The commands prove, atlas, branches, minima, landscape and view also take a problem of your own in a
-file: FILE.toml, and --help after it.
+The commands prove, atlas, branches, measure, minima, landscape and view also take a problem of
+your own in a file: FILE.toml, and --help after it.
 
 \b
 Exit codes:

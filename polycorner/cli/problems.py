@@ -260,7 +260,7 @@ def atlas(file: Path, begin: Begin) -> None:
     search = begin(file.stem, {"file": str(file.resolve())})
 
     d = problem.polyhedron
-    found = partial(_inner_starts, problem)
+    found = partial(inner_starts, problem)
     (planar if _flat(problem) else skeletal)(search, d, found)
 
 
@@ -292,7 +292,7 @@ def minima(file: Path, starts: int, seed: int, as_json: bool, out: Path | None) 
     report_minima(file.stem, {"file": str(file)}, found, described, unit, as_json=as_json, out=out)
 
 
-def _inner_starts(problem: "ProblemFile", rng: Any) -> Any:
+def inner_starts(problem: "ProblemFile", rng: Any) -> Any:
     """Return the points of a file and random ones, those in the set first, ``(k, n)``."""
     import numpy as np
 
@@ -481,7 +481,7 @@ def view(file: Path, out: Path | None, seed: int) -> None:
         from polycorner.pictures import draw_region, save
 
         rng = np.random.default_rng(seed)
-        found = skeleton(problem.polyhedron, _inner_starts(problem, rng), rng=rng)
+        found = skeleton(problem.polyhedron, inner_starts(problem, rng), rng=rng)
         figure = draw_region(found, minima=[*problem.points.items()])
         path = out or Path(file.stem).with_suffix(".png")
         try:

@@ -148,12 +148,13 @@ class Kept:
         answer: dict[str, Any],
         draw: Callable[[Path], list[Path]],
         sheet: "Callable[[dict[str, Any]], Sheet] | None" = None,
+        name: str = "atlas.json",
     ) -> None:
         """Print the answer, write the files, and end the process if it was interrupted."""
 
         def write() -> Iterator[Path]:
             if self.out is not None:
-                yield write_answer(answer, self.out, "atlas.json")
+                yield write_answer(answer, self.out, name)
                 if self.drawn:
                     with writing(self.out), timed("drawing"):
                         yield from draw(self.out)

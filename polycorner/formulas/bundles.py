@@ -156,6 +156,52 @@ class Bundle(Value):
         results = batch.kernel.over(q.reshape(-1, q.shape[-1]), batch.address, order)
         return tuple([result.reshape(q.shape[:-1] + result.shape[1:]) for result in results])
 
+    def tabulated(self, *orders: int) -> dict[str, Any]:
+        """Return the calls as tables for compiled code.
+
+        Returns
+        -------
+        dict
+            ``calls``, of each the addresses of the code for the ``orders`` of derivatives, how many
+            variables go in and outputs come out, and where its entries begin in the others:
+            ``reads``, the coordinates; ``outputs``, the row of every output, or -1;
+            ``parameters``.  ``size`` is that of an array for inputs and outputs of one call.
+        """
+        calls: list[tuple[int, ...]] = []
+        reads: list[int] = []
+        outputs: list[int] = []
+        parameters: list[float] = []
+        size = 1
+        for call in self.calls:
+            kernel = call.family.kernel
+            k, m = kernel.variables, kernel.outputs
+            code = [kernel.compiled(order).point for order in orders]
+            for where in _layers(call.columns, call.rows):
+                calls.append((*code, k, m, len(reads), len(outputs), len(parameters)))
+                reads += call.reads
+                outputs += [where.get(column, -1) for column in range(m)]
+                parameters += call.parameters.tolist()
+            size = max(size, k + m * (1 + k + k * k))
+        return {
+            "calls": np.reshape(calls, (-1, len(orders) + 5)),
+            "reads": reads,
+            "outputs": outputs,
+            "parameters": [*parameters, 0.0],
+            "size": size,
+        }
+
     def _shapes(self, order: int) -> tuple[tuple[int, ...], ...]:
         m, n = len(self.functions), self.manifold.size
         return ((m,), (m, n), (m, n, n))[: order + 1]
+
+
+def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, int]]:
+    """Split (output, row) pairs into parts in which every output occurs at most once."""
+    layers: list[dict[int, int]] = []
+    for column, row in zip(columns, rows, strict=True):
+        free = next((layer for layer in layers if column not in layer), None)
+        if free is None:
+            layers.append({column: row})
+        else:
+            free[column] = row
+    return layers

@@ -160,30 +160,11 @@ class Problem(Checked):
     def _lay_out(self, scales: Array) -> "Laid":
         from polycorner.minimisation.descent.intermediate import Laid
 
-        calls: list[tuple[int, ...]] = []
-        reads: list[int] = []
-        outputs: list[int] = []
-        parameters: list[float] = []
-        size = 1
-        for call in self._bundle.calls:
-            kernel = call.family.kernel
-            k, m = kernel.variables, kernel.outputs
-            curved, straight = kernel.compiled(2).point, kernel.compiled(1).point
-            for where in _layers(call.columns, call.rows):
-                calls.append((curved, straight, k, m, len(reads), len(outputs), len(parameters)))
-                reads += call.reads
-                outputs += [where.get(column, -1) for column in range(m)]
-                parameters += call.parameters.tolist()
-            size = max(size, k + m * (1 + k + k * k))
         return Laid.of(
-            calls=np.reshape(calls, (-1, 7)),
-            reads=reads,
-            outputs=outputs,
-            parameters=[*parameters, 0.0],
+            **self._bundle.tabulated(2, 1),
             scales=scales,
             inequalities=self.inequalities,
             rows=self.rows,
-            size=size,
         )
 
     @cached_property
@@ -247,18 +228,6 @@ class Problem(Checked):
         away = distances(values[:-1], gradients[:-1])
         inside = (away[sorted(piece)] >= -miss).all()
         return bool(inside and (abs(away[self.inequalities :]) <= miss).all())
-
-
-def _layers(columns: tuple[int, ...], rows: tuple[int, ...]) -> list[dict[int, int]]:
-    """Split (output, row) pairs into parts in which every output occurs at most once."""
-    layers: list[dict[int, int]] = []
-    for column, row in zip(columns, rows, strict=True):
-        free = next((layer for layer in layers if column not in layer), None)
-        if free is None:
-            layers.append({column: row})
-        else:
-            free[column] = row
-    return layers
 
 
 def pose(polyhedron: Polyhedron, energy: "Energy") -> Problem:

@@ -1,4 +1,4 @@
-"""Clusters of sticky hard spheres: rigid clusters are corners, hinges are edges.
+"""Clusters of sticky hard spheres, or discs: rigid clusters are corners, hinges are edges.
 
 ``n`` spheres of unit diameter do not overlap: ``|x_i - x_j|^2 >= 1`` for every pair.  Modulo
 congruence a rigid cluster is a corner of this polyhedron; breaking one contact opens a one-
@@ -31,48 +31,65 @@ if TYPE_CHECKING:
     import sympy
 
 VARIABLES = ("x1", "y1", "z1", "x2", "y2", "z2")
+PLANE = ("x1", "y1", "x2", "y2")
 
 
-@lru_cache(maxsize=1)
-def _gap() -> Family:
-    """Return the gap of two spheres of unit diameter, ``|x_2 - x_1|^2 - 1``."""
-    return Family(("gap",), VARIABLES, (), _formulas, cache.source_key(__name__), "diameter^2")
+@lru_cache(maxsize=2)
+def _gap(dimension: int) -> Family:
+    """Return the gap of two spheres or discs of unit diameter, ``|x_2 - x_1|^2 - 1``."""
+    key = cache.source_key(__name__)
+    if dimension == 2:
+        return Family(("gap",), PLANE, (), _in_plane, f"{key} in the plane", "diameter^2")
+    return Family(("gap",), VARIABLES, (), _in_space, key, "diameter^2")
 
 
-def _formulas() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+def _in_space() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+    return {}, {"gap": _squared_distance(VARIABLES) - 1}
+
+
+def _in_plane() -> "tuple[dict[str, sympy.Expr], dict[str, sympy.Expr]]":
+    return {}, {"gap": _squared_distance(PLANE) - 1}
+
+
+def _squared_distance(names: tuple[str, ...]) -> "sympy.Expr":
     import sympy
 
-    x1, y1, z1, x2, y2, z2 = (sympy.Symbol(name, real=True) for name in VARIABLES)
-    return {}, {"gap": (x2 - x1) ** 2 + (y2 - y1) ** 2 + (z2 - z1) ** 2 - 1}
+    x = [sympy.Symbol(name, real=True) for name in names]
+    d = len(x) // 2
+    return sympy.Add(*[(b - a) ** 2 for a, b in zip(x[:d], x[d:], strict=True)])
 
 
 @dataclass(frozen=True)
 class SphereCluster(Checked, Described):
-    """``n`` hard spheres of unit diameter in space.
+    """``n`` hard spheres of unit diameter in space, or discs in the plane.
 
-    Coordinates are ``x1 y1 z1 ... xn yn zn``, in diameters.  The contact of spheres ``i < j`` is
-    called ``i-j``.
+    Coordinates are ``x1 y1 z1 ... xn yn zn``, in diameters; in the plane ``x1 y1 ... xn yn``.
+    The contact of spheres ``i < j`` is called ``i-j``.
 
     Parameters
     ----------
     count : int
         Number of spheres, at least 2.
+    dimension : int, optional
+        3, or 2 for discs in the plane.
 
     Raises
     ------
     ValueError
-        If ``count`` is no whole number above 1.
+        If ``count`` is no whole number above 1, or for other dimensions.
     """
 
     count: int
+    dimension: int = 3
 
     def __post_init__(self) -> None:
         checks.whole("count", self.count, least=2)
+        checks.whole("dimension", self.dimension, least=2, most=3)
 
     @cached_property
     def manifold(self) -> Manifold:
         """The product of one space for each sphere."""
-        return Manifold.euclidean("x y z", unit="diameter") ** self.count
+        return Manifold.euclidean("x y z"[: 2 * self.dimension - 1], unit="diameter") ** self.count
 
     @cached_property
     def pairs(self) -> tuple[tuple[int, int], ...]:
@@ -84,10 +101,11 @@ class SphereCluster(Checked, Described):
         """``|x_i - x_j|^2 - 1 >= 0`` for every pair."""
         gaps = []
         for i, j in self.pairs:
-            reads = [self.manifold.names[3 * k + axis] for k in (i, j) for axis in range(3)]
+            d = self.dimension
+            reads = [self.manifold.names[d * k + axis] for k in (i, j) for axis in range(d)]
             name = f"{i + 1}-{j + 1}"
             gaps.append(
-                SmoothFunction.member(_gap(), "gap", self.manifold, reads=reads, label=name)
+                SmoothFunction.member(_gap(d), "gap", self.manifold, reads=reads, label=name)
             )
         return Polyhedron(self.manifold, AllOf(*gaps))
 
@@ -104,7 +122,7 @@ class SphereCluster(Checked, Described):
     def distances(self, q: ArrayLike) -> Array:
         """Return the distances of all pairs of centres, ``(..., n (n - 1) / 2)``."""
         points = self.manifold.points(q)
-        centres = points.reshape(*points.shape[:-1], self.count, 3)
+        centres = points.reshape(*points.shape[:-1], self.count, self.dimension)
         first, second = (list(side) for side in zip(*self.pairs, strict=True))
         return np.asarray(np.linalg.norm(centres[..., first, :] - centres[..., second, :], axis=-1))
 
@@ -121,8 +139,11 @@ class SphereCluster(Checked, Described):
     def stacked(self) -> Array:
         """Return a rigid cluster: a tetrahedron, and every further sphere in a hollow of three.
 
-        For fewer than four spheres a triangle or a pair.
+        For fewer than four spheres a triangle or a pair; of discs a strip of triangles.
         """
+        if self.dimension == 2:
+            k = np.arange(self.count)
+            return np.stack([k / 2, math.sqrt(0.75) * (k % 2)], axis=1).ravel()
         centres = [np.zeros(3), np.array([1.0, 0, 0]), np.array([0.5, math.sqrt(0.75), 0])]
         taken: set[tuple[int, ...]] = set()
         while len(centres) < self.count:
@@ -137,22 +158,21 @@ class SphereCluster(Checked, Described):
         return np.sort(self.distances(q))
 
     def _motions(self, q: Array) -> Array:
-        """Return the velocities of three translations and three rotations about the centroid."""
-        motions = (self._rotations @ q).reshape(6, -1)
-        motions[:3] = self._translations
-        return motions
+        """Return the velocities of translations, and of rotations about the centroid."""
+        return np.concatenate([self._translations, (self._rotations @ q).reshape(-1, len(q))])
 
     @cached_property
     def _translations(self) -> Array:
-        return np.tile(np.eye(3), self.count)
+        return np.tile(np.eye(self.dimension), self.count)
 
     @cached_property
     def _rotations(self) -> Array:
-        """The matrices of the six motions, stacked, those of the translations zero."""
-        motions = np.zeros((6, 3, 3))
-        for axis in range(3):
-            after, before = (axis + 1) % 3, (axis + 2) % 3
-            motions[3 + axis, before, after], motions[3 + axis, after, before] = 1.0, -1.0
+        """The matrices of the rotations, stacked."""
+        d, planes = self.dimension, [(1, 2), (2, 0), (0, 1)]
+        planes = planes if d == 3 else planes[2:]
+        motions = np.zeros((len(planes), d, d))
+        for motion, (after, before) in zip(motions, planes, strict=True):
+            motion[before, after], motion[after, before] = 1.0, -1.0
         centred = np.eye(self.count) - 1 / self.count
         return np.concatenate([np.kron(centred, motion) for motion in motions])
 

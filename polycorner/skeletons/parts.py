@@ -62,13 +62,13 @@ def _length(quotient: Quotient, points: Array, rows: Sequence[int]) -> float:
     from scipy.integrate import quad_vec
 
     moved = np.diff(points, axis=0)
-    arcs = _Arcs(quotient, points[:-1][moved.any(axis=1)], moved[moved.any(axis=1)], rows)
+    arcs = Arcs(quotient, points[:-1][moved.any(axis=1)], moved[moved.any(axis=1)], rows)
     error = 100 * quotient.tolerances.rounding  # absolute in scale units, and relative
     length, _ = quad_vec(arcs.speed, 0.0, 1.0, epsabs=error, epsrel=error, quadrature="gk15")
     return float(length)
 
 
-class _Arcs:
+class Arcs:
     """Arcs over chords, all of them at the same part of the way.
 
     The unknown is ``w``, how far the points of the arcs are from those of the chords, in scaled
@@ -90,6 +90,10 @@ class _Arcs:
 
     def speed(self, s: float) -> float:
         """Return the sum over the arcs of the length of ``dq/ds`` orthogonal to the orbit."""
+        return float(self.at(s)[1].sum())
+
+    def at(self, s: float) -> tuple[Array, Array]:
+        """Return the points of the arcs, and the lengths of ``dq/ds`` orthogonal to the orbit."""
         w, still = np.zeros_like(self.chords), 100 * self.quotient.tolerances.rounding * self.sizes
         for _ in range(STEPS):
             q = self.starts + self.scales * (s * self.chords + w)
@@ -102,7 +106,7 @@ class _Arcs:
         if len(self.lifts[0]) > 1:
             orbits = np.array([self._orbit(at) for at in q])
             way = way - np.einsum("kgi,kgj,kj->ki", orbits, orbits, way)
-        return float(np.linalg.norm(way, axis=1).sum())
+        return q, np.linalg.norm(way, axis=1)
 
     def _solved(self, q: Array) -> tuple[Array, Array]:
         """Return Newton's steps at points of the arcs, and the derivatives of ``w`` by ``s``."""

@@ -10,12 +10,13 @@ import pytest
 
 import polycorner
 from polycorner.formulas.tables import Layout
+from polycorner.measures.chain.intermediate import SHIPPED as CHAIN
 from polycorner.minimisation.descent.intermediate import SHIPPED as DESCENT
 from polycorner.motion.engine.intermediate import SHIPPED as ENGINE
 from polycorner.motion.hulls.intermediate import SHIPPED as HULLS
 from polycorner.proofs.lists.intermediate import SHIPPED as LISTS
 
-ALL = {shipped.file: shipped for shipped in (DESCENT, LISTS, HULLS, *ENGINE.values())}
+ALL = {shipped.file: shipped for shipped in (CHAIN, DESCENT, LISTS, HULLS, *ENGINE.values())}
 
 
 @pytest.mark.parametrize("shipped", ALL.values(), ids=ALL)

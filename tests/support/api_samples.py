@@ -16,6 +16,7 @@ from polycorner import (
     dumbbells,
     files,
     landscapes,
+    measures,
     models,
     motion,
     polyhedra,
@@ -38,6 +39,10 @@ certificate = cache(lambda: pc.certify(square(), energy(), [0.0, 0.0]))
 diagram = cache(lambda: branches.branches(certificate(), "a", (1.0, 3.0)))
 minima = cache(lambda: pc.minima(square(), energy(), starts=3, box=UNIT))
 skeleton = cache(lambda: pc.skeleton(square(), [[0.5, 0.5]]))
+strata_measures = cache(
+    lambda: measures.measure(skeleton(), weighting=measures.Weighting(stickiness=2.0))
+)
+strata_sample = cache(lambda: measures.sample(square(), [[0.5, 0.5]], 20, rng=0))
 
 
 @cache

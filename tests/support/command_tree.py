@@ -9,6 +9,7 @@ QUICK = {
     "dyad": ("--drum", "inf"),
     "atlas dyad": ("--plane", "--budget", "1"),
     "atlas spheres": ("--count", "5"),
+    "measure spheres": ("--count", "5"),
     "atlas tutorial": (),
     "atlas pinball": ("--budget", "1"),
     "atlas disks": ("--count", "2"),

@@ -1,0 +1,1 @@
+"""The compiled chain that samples strata."""
