@@ -44,9 +44,11 @@ from examples import (
     ex33_snap_through,
     ex34_two_link_arm,
     ex35_slider_crank,
-    ex36_sticky_clusters,
+    ex36_nested_corner,
+    ex37_sticky_clusters,
 )
-from polycorner import Verdict, stratum_at
+from polycorner import Verdict, minimise, stratum_at
+from polycorner.dumbbells import DumbbellPair
 from polycorner.minimisation import Mobility
 from polycorner.models.disks.disks import TorusDisks
 from polycorner.polyhedra import LocalType
@@ -145,10 +147,10 @@ def test_clusters_of_atoms(tmp_path):
 
 
 def test_sticky_clusters(tmp_path):
-    measured, between = ex36_sticky_clusters.main()
+    measured, between = ex37_sticky_clusters.main()
     assert sorted(measured.probabilities) == pytest.approx([0.04, 0.96])
     assert between.passage_times([1])[1] == 0
-    picture = ex36_sticky_clusters.draw(measured, tmp_path / "clusters.png")
+    picture = ex37_sticky_clusters.draw(measured, tmp_path / "clusters.png")
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -450,3 +452,45 @@ def test_rough_walls_of_a_silo_bear_a_part_of_the_weight(tmp_path):
         assert path.audit < 1e-3
         assert path.max_penetration < 0.02
     assert ex32_silo.draw(found, tmp_path / "silo.png").stat().st_size > 10_000
+
+
+def test_a_nested_pair_ends_where_its_multipliers_do(tmp_path):
+    """Against closed forms: ``r + t = 2 r sqrt(1 - r^2/l^2)``, and the height of a triangle."""
+    found = ex36_nested_corner.main()
+    r, length = ex36_nested_corner.BALL, ex36_nested_corner.LENGTH
+    critical = 2 * r * np.sqrt(1 - r**2 / length**2) - r
+    (limit,) = [e for e in found.equal.events if e.kind.name == "CORNER_LIMIT"]
+    assert limit.parameter == pytest.approx(critical, abs=1e-9)
+    assert sorted(found.equal.arcs[k].active for k in limit.arcs) == [
+        ("A2B1",), ("A2B1", "A2b", "aB1"),
+    ]  # fmt: skip
+    (curve,) = found.drums.curves
+    np.testing.assert_allclose(curve.parameters[:, 0], critical, atol=1e-9)
+
+    assert found.weights.closed
+    (meeting,) = [m for m in found.weights.meetings if m.kind.name == "CONTACTS"]
+    np.testing.assert_allclose(meeting.parameters, [critical, 1.0], atol=1e-8)
+    assert len(meeting.curves) == 4
+    # Exchanging the dumbbells inverts the ratio.
+    for kind in ("OPENS", "CORNER_LIMIT"):
+        curves = [c.parameters for c in found.weights.curves if c.kind.name == kind]
+        (rod, ratio), (other, inverse) = (
+            max(c[[0, -1]], key=lambda p: abs(p[1] - 1)) for c in curves
+        )
+        assert (other, 1 / inverse) == pytest.approx((rod, ratio), rel=1e-8)
+    pair = DumbbellPair(length, r, ex36_nested_corner.ROD, ex36_nested_corner.DRUM)
+    assert found.ratio == pytest.approx(1.728, abs=5e-4)
+    for part, contacts in ((0.999, 3), (1.001, 2)):
+        energy = ex36_nested_corner.weighed(pair, found.ratio * part)
+        minimum = minimise(pair.polyhedron, energy, pair.nested("R"))
+        assert len(minimum.found.strong_positions) == contacts
+
+    short, end = [], []
+    for curve in found.lengths.curves:
+        (end if curve.active == ("A2B1",) else short).append(curve.parameters.T)
+    for rod, long in short:
+        np.testing.assert_allclose(long**2 / 4, 4 * r**2 - (r + rod) ** 2, rtol=1e-9)
+    ((rod, long),) = end
+    np.testing.assert_allclose(r + rod, 2 * r * np.sqrt(1 - r**2 / long**2), rtol=1e-9)
+    for path in ex36_nested_corner.draw(found, tmp_path):
+        assert path.stat().st_size > 10_000

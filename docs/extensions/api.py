@@ -82,7 +82,7 @@ GROUPS = (
         "Equilibria over a parameter, with the events at which they change, begin and end.",
         {
             "branches": "branches Diagram Arc BranchEvent BranchKind hysteresis Hysteresis Leg "
-            "Jump",
+            "Jump event_curves EventMap EventCurve MeetingPoint MeetingKind",
         },
     ),
     Group(
@@ -207,8 +207,8 @@ GROUPS = (
         "Figures of sets, bodies and results.",
         {
             "pictures": "draw_region draw_arrangement draw_clusters draw_motion draw_packing "
-            "draw_critical draw_cells draw_barcode draw_branches draw_landscape draw_landscape_map "
-            "film MotionFilm film_route skeleton_page save save_motion",
+            "draw_critical draw_cells draw_barcode draw_branches draw_event_map draw_landscape "
+            "draw_landscape_map film MotionFilm film_route skeleton_page save save_motion",
         },
     ),
     Group(

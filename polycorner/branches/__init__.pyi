@@ -1,4 +1,6 @@
 from .diagram import Arc, BranchEvent, BranchKind, Diagram
+from .event_curves import event_curves
+from .event_map import EventCurve, EventMap, MeetingKind, MeetingPoint
 from .hysteresis import Hysteresis, Jump, Leg, hysteresis
 from .search import branches
 
@@ -7,9 +9,14 @@ __all__ = [
     "BranchEvent",
     "BranchKind",
     "Diagram",
+    "EventCurve",
+    "EventMap",
     "Hysteresis",
     "Jump",
     "Leg",
+    "MeetingKind",
+    "MeetingPoint",
     "branches",
+    "event_curves",
     "hysteresis",
 ]

@@ -114,11 +114,12 @@ class _Continuation(Stepper[P]):
 
     def run(self) -> Course[P]:
         """Step to the first event."""
-        h = self.options.first_step
+        h, turn = self.options.first_step, self.options.turn
         while True:
             if len(self.passed) > self.most:
                 return self._course(Stop.LONG)
-            taken = next((trial for trial in self.trials(h) if trial[-1]), None)
+            fitting = (trial for trial in self.trials(h) if trial[-1])
+            taken = next((one for one in fitting if one[0].turns(self.point) < turn), None)
             if taken is None:
                 return self._course(Stop.LOST)
             point, t, h, _ = taken

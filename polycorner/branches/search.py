@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -18,17 +18,13 @@ from polycorner.branches.events import (
     kind_of,
     weak_event,
 )
-from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
+from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem, posed
 from polycorner.kinds import checked
 from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.parametric import lifted_problem
-from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
 from polycorner.searches import Ending, Task, work_through
-
-UNITS = 5.0  # of the continuation in the interval: a step is at most a tenth of it by default
 
 
 @dataclass
@@ -113,17 +109,10 @@ class _BranchSearch:
             node.notes.append("an arc arrives along a curve that is not known to leave")
         node.arms.append(Arm(face, back, edge))
 
-    def _apart(self, one: FritzJohn, two: FritzJohn) -> float:
-        """Return how far two points are apart, with their multipliers."""
-        system = self.system
-        moved = system.manifold.chord(system.place(one.u), system.place(two.u))
-        parts = (moved / system.manifold.scale_array, one.mu - two.mu, [one.s - two.s])
-        return max(float(np.abs(part).max(initial=0.0)) for part in parts)
-
     def _known(self, node: Node) -> int | None:
         near = self.system.tolerances.corner
         for k, other in enumerate(self.nodes):
-            if other.weak == node.weak and self._apart(other.at, node.at) <= near:
+            if other.weak == node.weak and other.at.apart(node.at) <= near:
                 return k
         return None
 
@@ -136,7 +125,7 @@ class _BranchSearch:
             part = (at.s - one.s) / ((two.s - one.s) or 1.0)
             pin = np.eye(len(at.x))[n]
             found = corrected(at.moved(one.x + part * (two.x - one.x)), pin, math.inf)
-            if found is not None and self._apart(found, at) <= self.system.tolerances.near:
+            if found is not None and found.apart(at) <= self.system.tolerances.near:
                 return True
         return False
 
@@ -255,7 +244,7 @@ def branches(  # noqa: PLR0913 - keywords of one search
     several = [certificate] if isinstance(certificate, Certificate) else [*certificate]
     if not several:
         checks.refuse("certificate", "at least one", several)
-    low, high = _interval(interval)
+    low, high = interval_ends(interval)
     checks.real("extent", extent, above=0, infinite=True)
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     checks.whole("max_arcs", max_arcs, least=1)
@@ -273,7 +262,8 @@ def branches(  # noqa: PLR0913 - keywords of one search
     return _diagram(search, several[0], rates, parameter, (low, high), done)
 
 
-def _interval(given: object) -> tuple[float, float]:
+def interval_ends(given: object) -> tuple[float, float]:
+    """Return the ends of an interval that was given."""
     ends = checks.numbers("interval", given, "two finite numbers, ascending")
     if ends.shape != (2,) or not np.isfinite(ends).all() or not ends[0] < ends[1]:
         checks.refuse("interval", "two finite numbers, ascending", given)
@@ -304,27 +294,8 @@ def _system(
     now = _value(certificate, rates, parameter)
     if not low <= now <= high:
         checks.refuse("interval", f"one that contains {now:g}, of the certificate", interval)
-    speeds = np.array([*rates.values()], dtype=np.float64)
-    values = np.array([next(iter(problem.parameter_values[name])) for name in rates])
-    whole, q = lifted_problem(problem, tuple(rates)), certificate.point
-    system = FritzJohnSystem(
-        problem=whole,
-        manifold=problem.polyhedron.manifold,
-        start=values + (low - now) * speeds,
-        rates=speeds * (high - low) / UNITS,
-        length=UNITS,
-        sizes=np.ones(whole.rows),
-        equations=tuple(independent_equations(problem.polyhedron, [q])),
-        symmetry=symmetry,
-        tolerances=certificate.tolerances,
-    )
-    known = system.at(q / problem.scales, (now - low) / (high - low) * UNITS)
-    first, second = (np.linalg.norm(d.reshape(len(d), -1), axis=1) for d in known[1:])
-    # The curvature of a distance of parallel segments is none by which to measure it.
-    level = np.append(abs(known.values[:-1]) + first[:-1], math.inf)
-    bent = level <= certificate.tolerances.zero * second
-    sizes = first + np.where(bent, second, np.minimum(second, level))
-    return replace(system, sizes=np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0))
+    q, tolerances = certificate.point, certificate.tolerances
+    return posed(problem, [rates], [interval], [now], q, symmetry, tolerances)
 
 
 def _start(

@@ -18,17 +18,23 @@ arc ends where one of these vanishes, and there exactly one arc of another face 
 ([KojimaHirabayashi] sec. 4, [JJT]).
 """
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
 
+from polycorner.minimisation.parametric import lifted_problem
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import null_space, unit_rows
+from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import Tolerances
 from polycorner.values import cached_property
+
+UNITS = 5.0  # of the continuation in an interval: a step is at most a tenth of it by default
 
 Face = tuple[int, ...]  # positions of the inequalities that are held, in ascending order
 
@@ -43,7 +49,7 @@ class Derivatives(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FritzJohnSystem:
-    """The equations for all faces of a polyhedron with one parameter.
+    """The equations for all faces of a polyhedron with one parameter, or several.
 
     Attributes
     ----------
@@ -51,11 +57,12 @@ class FritzJohnSystem:
         On the manifold of the coordinates, with the formulas' parameters as further coordinates.
     manifold : Manifold
         Of the coordinates alone.
-    start, rates : (p,) array
-        Values of the formulas' parameters at the start of the interval, and their derivatives by
-        ``s``.
+    start : (p,) array
+        Values of the formulas' parameters at the start of the interval, or of a rectangle.
+    rates : (p, d) array
+        Their derivatives by ``s``.
     length : float
-        Of the interval, in units of ``s``.
+        Of the interval, or of the sides of the rectangle, in units of ``s``.
     sizes : (M,) array
         Sizes by which the functions and the energy are divided.
     equations : tuple of int
@@ -93,17 +100,22 @@ class FritzJohnSystem:
         """Return coordinates, not wrapped."""
         return u * self.manifold.scale_array
 
-    def values(self, s: float) -> Array:
-        """Return the values of the formulas' parameters."""
-        return self.start + s * self.rates
+    @property
+    def d(self) -> int:
+        """The number of parameters."""
+        return int(self.rates.shape[1])
 
-    def at(self, u: Array, s: float) -> Derivatives:
+    def values(self, s: Array | float) -> Array:
+        """Return the values of the formulas' parameters."""
+        return np.asarray(self.start + self.rates @ np.atleast_1d(s))
+
+    def at(self, u: Array, s: Array | float) -> Derivatives:
         """Return values and derivatives of all functions by ``(u, s)``, divided by the sizes."""
-        n, p = self.n, len(self.rates)
+        n, (p, d) = self.n, self.rates.shape
         q = np.concatenate([self.place(u), self.values(s)])
         values, gradients, hessians = self.problem.evaluate(q, 2)
-        onto = np.zeros((n + p, n + 1))
-        onto[:n, :n], onto[n:, n] = np.eye(n), self.rates
+        onto = np.zeros((n + p, n + d))
+        onto[:n, :n], onto[n:, n:] = np.eye(n), self.rates
         size = self.sizes[:, None]
         return Derivatives(
             values / self.sizes,
@@ -121,9 +133,9 @@ class FritzJohnSystem:
         """Return the rows that have multipliers on a face: its own, equations, the energy."""
         return [*face, *self.equations, self.problem.rows - 1]
 
-    def guess(self, face: Face, u: Array, s: float, mu: Array) -> Array:
+    def guess(self, face: Face, u: Array, s: Array | float, mu: Array) -> Array:
         """Return the vector of unknowns ``(u, s, mu)`` on a face, of multipliers of all rows."""
-        return np.concatenate([u, [s], mu[self.rows(face)]])
+        return np.concatenate([u, np.atleast_1d(s), mu[self.rows(face)]])
 
     def point(self, face: Face, x: Array) -> "FritzJohn":
         """Return the residual and the derivatives of the equations at a guess."""
@@ -136,10 +148,12 @@ class FritzJohn:
     Attributes
     ----------
     u, s, mu
-        The parts of the guess; ``mu`` are the multipliers of all rows.
+        The parts of the guess; ``mu`` are the multipliers of all rows, ``s`` the first parameter.
+    both : (d,) array
+        All parameters.
     left : (N,) array
         The residual.
-    jacobian : (N, n + 1 + k) array
+    jacobian : (N, n + d + k) array
         Its derivative, and the rows that keep a step across the orbit.
     finite : bool
         Whether all are.
@@ -147,11 +161,11 @@ class FritzJohn:
 
     def __init__(self, system: FritzJohnSystem, face: Face, x: Array) -> None:
         self.system, self.face, self.x = system, face, x
-        n, rows = system.n, system.rows(face)
-        self.u, self.s, own = x[:n], float(x[n]), x[n + 1 :]
+        n, p, rows = system.n, system.n + system.d, system.rows(face)
+        self.u, self.s, self.both, own = x[:n], float(x[n]), x[n:p], x[p:]
         self.mu = np.zeros(system.problem.rows)
         self.mu[rows] = own
-        self.known = system.at(self.u, self.s)
+        self.known = system.at(self.u, self.both)
         values, gradients, hessians = self.known
         sign = np.where(np.arange(len(rows)) < len(rows) - 1, -1.0, 1.0)
         slopes, k = sign[:, None] * gradients[rows, :n], len(rows) - 1
@@ -162,10 +176,10 @@ class FritzJohn:
         self.left = np.concatenate(
             [own @ slopes, values[rows[:-1]], [(own @ own - 1) / 2], np.zeros(g)]
         )
-        J = np.zeros((n + k + 1 + g, n + 1 + len(rows)))
-        J[:n, : n + 1], J[:n, n + 1 :] = bent[:n], slopes.T
-        J[n : n + k, : n + 1] = gradients[rows[:-1]]
-        J[n + k, n + 1 :] = own
+        J = np.zeros((n + k + 1 + g, p + len(rows)))
+        J[:n, :p], J[:n, p:] = bent[:n], slopes.T
+        J[n : n + k, :p] = gradients[rows[:-1]]
+        J[n + k, p:] = own
         J[n + k + 1 :, :n] = self.orbit
         self.jacobian = J
         self.finite = bool(np.isfinite(J).all() and np.isfinite(self.left).all())
@@ -173,6 +187,11 @@ class FritzJohn:
     def moved(self, x: Array) -> Self:
         """Return the equations at another guess."""
         return type(self)(self.system, self.face, x)
+
+    def turns(self, before: Self) -> float:
+        """Return the angle by which what else belongs to a point has turned."""
+        del before  # a subclass has more
+        return 0.0
 
     def spectra(self) -> list[Array]:
         """Return numbers, ascending, of which none may change sign along a curve."""
@@ -184,6 +203,13 @@ class FritzJohn:
         across = np.zeros((len(self.jacobian), len(self.orbit)))
         across[: self.system.n] = self.orbit.T
         return np.hstack([self.jacobian, across])
+
+    def apart(self, other: "FritzJohn") -> float:
+        """Return how far another point is, with its multipliers."""
+        manifold, place = self.system.manifold, self.system.place
+        moved = manifold.chord(place(self.u), place(other.u)) / manifold.scale_array
+        parts = (moved, self.mu - other.mu, self.both - other.both)
+        return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
     def kernel(self) -> tuple[Array, Array]:
         """Return singular values ``(N,)``, ascending, and their vectors, of the Jacobian."""
@@ -198,38 +224,93 @@ class FritzJohn:
         return np.asarray(-t if like is not None and t @ like < 0 else t)
 
     @cached_property
-    def _spectrum(self) -> tuple[Array, Array]:
-        n, rows = self.system.n, self.system.rows(self.face)[:-1]
-        held = np.vstack([self.known.gradients[rows, :n], self.orbit])
-        basis = null_space(unit_rows(held), self.system.tolerances.rank)
+    def spectrum(self) -> tuple[Array, Array]:
+        """Curvatures along the face, and their directions as rows."""
+        basis = self.along()
         values, vectors = np.linalg.eigh(basis.T @ self.curvature @ basis)
         return values, (basis @ vectors).T
 
-    def curvatures(self) -> Array:
+    def along(self, also: Face = ()) -> Array:
+        """Return orthonormal columns along the face, and along other functions' zeros."""
+        rows = [*also, *self.system.rows(self.face)[:-1]]
+        held = np.vstack([self.known.gradients[rows, : self.system.n], self.orbit])
+        return null_space(unit_rows(held), self.system.tolerances.rank)
+
+    def curvatures(self, also: Face = ()) -> Array:
         """Return eigenvalues of the Lagrangian's Hessian along the face, ascending."""
-        return self._spectrum[0]
+        if not also:
+            return self.spectrum[0]
+        basis = self.along(also)
+        return np.asarray(np.linalg.eigvalsh(basis.T @ self.curvature @ basis))
 
     @property
     def falling(self) -> Array:
         """The directions along the face of negative curvature, ``(i, n)``."""
-        values, vectors = self._spectrum
+        values, vectors = self.spectrum
         return vectors[values < 0]
 
     def watched(self) -> tuple[Array, Array]:
-        """Return what must not be negative along an arc ``(m + 3,)``, and its derivatives by x.
+        """Return what must not be negative along an arc ``(m + 1 + 2 d,)``, and derivatives by x.
 
         These are, row by row, the values of the open inequalities and the multipliers of the held
-        ones; the multiplier of the energy; and the parameter's distances from both ends.
+        ones; the multiplier of the energy; and the parameters' distances from both ends.
         """
-        system, n = self.system, self.system.n
+        system, n, p = self.system, self.system.n, self.system.n + self.system.d
         m, face = system.problem.inequalities, list(self.face)
-        values = np.concatenate(
-            [self.known.values[:m], self.x[-1:], [self.s, system.length - self.s]]
-        )
+        ends = [self.both, system.length - self.both]
+        values = np.concatenate([self.known.values[:m], self.x[-1:], *ends])
         values[face] = self.mu[face]
-        slopes = np.zeros((m + 3, len(self.x)))
-        slopes[:m, : n + 1] = self.known.gradients[:m]
+        slopes = np.zeros((len(values), len(self.x)))
+        slopes[:m, :p] = self.known.gradients[:m]
         slopes[face] = 0.0
-        slopes[face, n + 1 + np.arange(len(face))] = 1.0
-        slopes[m, -1], slopes[m + 1, n], slopes[m + 2, n] = 1.0, 1.0, -1.0
+        slopes[face, p + np.arange(len(face))] = 1.0
+        slopes[m, -1] = 1.0
+        slopes[m + 1 :, n:p] = np.vstack([np.eye(p - n), -np.eye(p - n)])
         return values, slopes
+
+
+def posed(
+    problem: Problem,
+    rates: Sequence[Mapping[str, float]],
+    intervals: Sequence[tuple[float, float]],
+    now: Sequence[float],
+    q: Array,
+    symmetry: Symmetry,
+    tolerances: Tolerances,
+) -> FritzJohnSystem:
+    """Return the equations over an interval of each parameter, sized at a point.
+
+    Parameters
+    ----------
+    problem : Problem
+        At the values ``now`` of the parameters.
+    rates : sequence of mapping from str to float
+        For each parameter the derivatives of the formulas' parameters by it.
+    intervals : sequence of (float, float)
+    now : sequence of float
+    q : (n,) array
+    symmetry : Symmetry
+    tolerances : Tolerances
+    """
+    names = tuple(dict.fromkeys(name for some in rates for name in some))
+    speeds = np.array([[some.get(name, 0.0) for some in rates] for name in names])
+    values = np.array([next(iter(problem.parameter_values[name])) for name in names])
+    whole, (low, high) = lifted_problem(problem, names), np.transpose(intervals)
+    system = FritzJohnSystem(
+        problem=whole,
+        manifold=problem.polyhedron.manifold,
+        start=values + speeds @ (low - now),
+        rates=speeds * (high - low) / UNITS,
+        length=UNITS,
+        sizes=np.ones(whole.rows),
+        equations=tuple(independent_equations(problem.polyhedron, [q])),
+        symmetry=symmetry,
+        tolerances=tolerances,
+    )
+    known = system.at(q / problem.scales, (now - low) / (high - low) * UNITS)
+    first, second = (np.linalg.norm(d.reshape(len(d), -1), axis=1) for d in known[1:])
+    # The curvature of a distance of parallel segments is none by which to measure it.
+    level = np.append(abs(known.values[:-1]) + first[:-1], math.inf)
+    bent = level <= tolerances.zero * second
+    sizes = first + np.where(bent, second, np.minimum(second, level))
+    return replace(system, sizes=np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0))

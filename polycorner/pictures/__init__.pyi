@@ -3,6 +3,7 @@ from .barcodes import draw_barcode
 from .branches import draw_branches
 from .clusters import draw_clusters
 from .disks import draw_critical
+from .event_maps import draw_event_map
 from .exports import save_motion
 from .landscape_maps import draw_landscape_map
 from .landscapes import draw_landscape
@@ -39,6 +40,7 @@ __all__ = [
     "draw_cells",
     "draw_clusters",
     "draw_critical",
+    "draw_event_map",
     "draw_landscape",
     "draw_landscape_map",
     "draw_motion",

@@ -87,6 +87,9 @@ VALUES = {
     "CriticalSearch": lambda: of.disks().critical_search(0, starts=3),
     "Diagram": of.diagram,
     "Arc": lambda: of.diagram().arcs[0],
+    "EventMap": of.event_map,
+    "EventCurve": lambda: of.event_map().curves[0],
+    "MeetingPoint": lambda: of.event_map().meetings[0],
     "Hysteresis": lambda: branches.hysteresis(of.diagram(), start=[0.0, 0.0]),
     "Leg": lambda: branches.hysteresis(of.diagram()).legs[0],
     "Jump": lambda: branches.Jump(
@@ -267,6 +270,12 @@ CALLS = {
         "parameter": "a",
         "interval": (1.0, 3.0),
     },
+    "branches.event_curves": lambda: {
+        "diagram": of.pressed(),
+        "parameter": "r",
+        "interval": (-0.8, 0.9),
+    },
+    "EventMap.minima": lambda: {"first": 0.5, "second": 0.5},
     "branches.hysteresis": lambda: {"diagram": of.diagram()},
     "Diagram.named": lambda: {"parameter": "b", "value": 2.0},
     "Diagram.values_at": lambda: {"value": 2.0},

@@ -177,6 +177,7 @@ DUMBBELLS = {
     },
     "pictures.draw_barcode": lambda: {"nerve": of.nerve()},
     "pictures.draw_branches": lambda: {"diagram": of.diagram()},
+    "pictures.draw_event_map": lambda: {"found": of.event_map()},
     "pictures.draw_cells": lambda: {"proof": of.cell()},
     "pictures.draw_clusters": lambda: {"model": of.spheres(), "points": [of.tetrahedron()]},
     "pictures.draw_critical": lambda: {"model": of.disks(), "configurations": of.critical()},

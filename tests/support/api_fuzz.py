@@ -34,8 +34,8 @@ REASONS = {
         Problem.check_parameters Problem.descend Problem.holds Problem.evaluate
         Problem.mask Problem.on_face Problem.restore Problem.stated
         Problem.with_independent_equations TorusDisks.distances UnevenFriction.numbers""",
-    ENUMERATION: """BranchKind Completeness Consistency End Entrapment EventKind LocalType Mobility
-        Status Verdict""",
+    ENUMERATION: """BranchKind Completeness Consistency End Entrapment EventKind LocalType
+        MeetingKind Mobility Status Verdict""",
     ERROR: "NonsmoothWarning PolycornerError PortTakenError SolverError SweepError",
     NOTHING: """dumbbells.plane_depth_formula dumbbells.plane_heading_formula
         motion.time_symbol""",

@@ -37,6 +37,14 @@ square = cache(lambda: pc.Polyhedron(M, {"left": X, "bottom": Y, "right": 1 - X,
 energy = cache(lambda: pc.SmoothFunction("energy", STRETCH * X + Y, M, parameters={"a": 2.0}))
 certificate = cache(lambda: pc.certify(square(), energy(), [0.0, 0.0]))
 diagram = cache(lambda: branches.branches(certificate(), "a", (1.0, 3.0)))
+FOOT = sympy.symbols("s r")
+spring = cache(
+    lambda: pc.SmoothFunction(
+        "spring", (X - FOOT[0]) ** 2 + (Y - FOOT[1]) ** 2, M, parameters={"s": -0.5, "r": -0.5}
+    )
+)
+pressed = cache(lambda: branches.branches(pc.certify(square(), spring(), [0, 0]), "s", (-0.8, 0.9)))
+event_map = cache(lambda: branches.event_curves(pressed(), "r", (-0.8, 0.9)))
 minima = cache(lambda: pc.minima(square(), energy(), starts=3, box=UNIT))
 skeleton = cache(lambda: pc.skeleton(square(), [[0.5, 0.5]]))
 strata_measures = cache(

@@ -9,7 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import placed_pairs
 
-from polycorner import Verdict
+from polycorner import Verdict, minimise
+from polycorner.branches import branches, event_curves
 from polycorner.dumbbells import DumbbellPair, dyad_minima
 from polycorner.dumbbells.statics.minima_map import (
     crossing_clearance,
@@ -249,3 +250,29 @@ def test_a_map_can_be_repeated_and_interrupted():
     for kind in cut.kinds:
         one, two = (f.counts[..., f.kinds.index(kind)][cut.examined] for f in (whole, cut))
         np.testing.assert_array_equal(one, two)
+
+
+def test_nested_kinds_change_on_curves_of_events():
+    """The curves are followed at one ``l/R``, for balls of radius 1; minima are sampled."""
+    curvature, rods, lengths = 0.5, [0.1, 0.5, 0.9], [2.5, 3.0, 4.5]
+    starts = []
+    for rod in (0.1, 0.7):
+        pair = DumbbellPair(3.0, 1.0, rod, 3.0 / curvature)
+        starts.append(minimise(pair.polyhedron, pair.energy, pair.nested("R")))
+    symmetry = energy_symmetry(pair)
+    change = {"l": 1.0, "R": 1 / curvature, "rho": 1 / curvature}
+    over_rods = branches(starts, "t", (0.02, 0.99), symmetry=symmetry)
+    found = event_curves(over_rods, change, (-0.8, 2.0), symmetry=symmetry)
+    borders = {}
+    for curve in found.curves:
+        rod, longer = curve.parameters[np.argsort(curve.parameters[:, 1])].T
+        limit = curve.kind.name == "CORNER_LIMIT"
+        borders.setdefault(limit, []).append(np.interp(np.array(lengths) - 3.0, longer, rod))
+    # Where a ball reaches a rod, from both sides, up to the interpolation.
+    np.testing.assert_allclose(*borders[False], rtol=1e-3)
+    (ends,) = borders[True]
+    sampled = minima_map(curvatures=[curvature], rods=rods, lengths=lengths, starts=100)
+    for k, reached in enumerate(borders[False][0]):
+        for j, rod in enumerate(rods):
+            assert sampled.has("staggered")[0, j, k] == (rod < reached)
+            assert sampled.has("delta")[0, j, k] == (reached < rod < ends[k])

@@ -9,7 +9,7 @@ energy.  ``measure`` weighs them by rotations, vibrations and the symmetry numbe
 spheres, the octahedron has four percent, as measured ([MABM]).  Along the edges of the skeleton
 one cluster changes into another: ``rates`` gives the matrix of rates, where spheres stick strongly.
 
-Run it to draw the clusters: ``python examples/ex36_sticky_clusters.py [FOLDER]``.
+Run it to draw the clusters: ``python examples/ex37_sticky_clusters.py [FOLDER]``.
 """
 
 import sys
@@ -45,4 +45,4 @@ if __name__ == "__main__":
     measured, between = main()
     print(measured)
     print(between)
-    print(f"wrote {draw(measured, folder / 'ex36_sticky_clusters.png')}")
+    print(f"wrote {draw(measured, folder / 'ex37_sticky_clusters.png')}")
