@@ -82,7 +82,8 @@ GROUPS = (
         "Equilibria over a parameter, with the events at which they change, begin and end.",
         {
             "branches": "branches Diagram Arc BranchEvent BranchKind hysteresis Hysteresis Leg "
-            "Jump event_curves EventMap EventCurve MeetingPoint MeetingKind",
+            "Jump event_curves EventMap EventCurve MeetingPoint MeetingKind "
+            "prove_branches BranchProof BranchProofOptions",
         },
     ),
     Group(

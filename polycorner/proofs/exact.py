@@ -25,7 +25,7 @@ import numpy as np
 from polycorner.intervals.balls import ball, exact, integer_relation
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
-from polycorner.proofs.kkt import Enclosure
+from polycorner.proofs.kkt import Enclosure, KKTSystem
 from polycorner.proofs.polynomials import Polynomial
 from polycorner.proofs.symbols import Symbols, constants, evaluate, opened
 
@@ -69,6 +69,7 @@ class ExactPoint:
 def recognised(enclosure: Enclosure) -> ExactPoint | None:
     """Return the solution in an enclosure exactly, if it is recognised and shown to be one."""
     system = enclosure.predictor.system
+    assert isinstance(system, KKTSystem)
     formulas, symbols = system.formulas, Symbols()
     n = system.dimension
     if formulas.free:

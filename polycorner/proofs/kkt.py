@@ -27,7 +27,7 @@ Since ``J`` is convex and all its matrices are regular, the inertia of the KKT m
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from polycorner.intervals.balls import (
     ball,
@@ -84,6 +84,33 @@ class Linearisation:
     rows: "list[list[Ball]]"
     curvature: "list[list[Ball]]"
     forms: SmoothForms
+
+
+class Equations(Protocol):
+    """Square equations with parameters, as of :class:`KKTSystem`, which Krawczyk's test is for."""
+
+    @property
+    def dimension(self) -> int:
+        """The number of unknowns that formulas read, which come first."""
+
+    @property
+    def size(self) -> int:
+        """The number of unknowns."""
+
+    @property
+    def units(self) -> tuple[float, ...]:
+        """Unit of each unknown."""
+
+    def at(self, z: "Sequence[Ball]", p: "Sequence[Ball]" = ()) -> Linearisation | Undecided:
+        """Return the equations and their derivatives on boxes of unknowns and parameters."""
+
+    def linear(self, z: "Sequence[Ball]", box: Box) -> Linearisation | Undecided:
+        """Return the same where what formulas read is enclosed jointly by ``box``."""
+
+    def bend(
+        self, z: "Sequence[Ball]", tangents: "Sequence[Sequence[Ball]]", box: Box
+    ) -> "list[Ball] | Undecided":
+        """Return the second-order remainder of the equations along a predictor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +243,7 @@ def _pairs(reach: "Sequence[Ball]") -> "Iterator[tuple[int, int, Ball]]":
 
 
 def newton(
-    system: KKTSystem,
+    system: Equations,
     z: "Sequence[Ball]",
     p: "Sequence[Ball]" = (),
     *,
@@ -239,7 +266,7 @@ def newton(
 
 
 def _settled(
-    system: KKTSystem, z: "Sequence[Ball]", p: "Sequence[Ball]", small: "Ball", steps: int
+    system: Equations, z: "Sequence[Ball]", p: "Sequence[Ball]", small: "Ball", steps: int
 ) -> "list[Ball] | Undecided":
     """Take Newton steps until one is relatively small, then one more."""
     last = False
@@ -275,8 +302,7 @@ class Predictor:
 
     Attributes
     ----------
-    system : KKTSystem
-        The equations.
+    system : Equations
     cell : Cell
         The parameters.
     centre : list of Ball
@@ -285,7 +311,7 @@ class Predictor:
         ``Z1``, ``[N][p]``; empty without parameters.
     """
 
-    system: KKTSystem
+    system: Equations
     cell: Cell
     centre: "list[Ball]"
     tangents: "list[list[Ball]]"
@@ -357,7 +383,7 @@ class Enclosure:
 
 
 def enclose(
-    system: KKTSystem, centre: "list[Ball]", cell: Cell | None = None, *, bits: int
+    system: Equations, centre: "list[Ball]", cell: Cell | None = None, *, bits: int
 ) -> Enclosure | Undecided:
     """Prove that the equations have exactly one solution in a box about ``centre``.
 

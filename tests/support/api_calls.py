@@ -96,6 +96,8 @@ VALUES = {
         0.5, branches.BranchKind.FOLD, np.zeros(2), np.ones(2), (), ("left",), (0.5, 0.25)
     ),
     "BranchEvent": lambda: of.diagram().events[0],
+    "BranchProof": lambda: branches.prove_branches(of.diagram()),
+    "BranchProofOptions": lambda: branches.BranchProofOptions(bits=80),
     "Crossing": lambda: minimisation.crossing(of.certificate(), "left", "a"),
     "CutDisc": lambda: motion.CutDisc(0.3, 0.1),
     "Cylinder": lambda: bodies.Cylinder(3.0),
@@ -277,6 +279,7 @@ CALLS = {
     },
     "EventMap.minima": lambda: {"first": 0.5, "second": 0.5},
     "branches.hysteresis": lambda: {"diagram": of.diagram()},
+    "branches.prove_branches": lambda: {"diagram": of.diagram()},
     "Diagram.named": lambda: {"parameter": "b", "value": 2.0},
     "Diagram.values_at": lambda: {"value": 2.0},
     "Arc.at": lambda: {"value": 2.0},
