@@ -65,7 +65,9 @@ class Form:
     added: bool = True  # whether others may be added without degenerating it
 
 
-def arc(place: Callable[[float], Any], low: float, high: float, index: int = 0, *active: str) -> Any:
+def arc(
+    place: Callable[[float], Any], low: float, high: float, index: int = 0, *active: str
+) -> Any:
     """Return an arc; places of one coordinate may be numbers."""
 
     def tupled(s: float) -> tuple[float, ...]:
@@ -188,6 +190,39 @@ def transcritical(rng: Rng) -> Form:
     return Form(("x",), (), energy, arcs, (event("BRANCH", arcs=range(4)),))
 
 
+def threefold(rng: Rng) -> Form:
+    """Return a branch point with the symmetry of a triangle: ``sigma z = conj(z)^2``."""
+    k, turns = rng.uniform(0.2, 0.5), [np.exp(2j * np.pi * i / 3) for i in range(3)]
+    energy = -k * s * (x**2 + y**2) / 2 + x**3 / 3 - x * y**2
+    arcs = [
+        arc(lambda v, z=z: (k * v * z.real, k * v * z.imag), *ends, 1 if z else 2 * (ends[0] == 0))
+        for z in (0j, *turns) for ends in ((-REACH, 0.0), (0.0, REACH))
+    ]  # fmt: skip
+    crossing = event("BRANCH", arcs=range(8))
+    return Form(("x", "y"), (), energy, tuple(arcs), (crossing,))
+
+
+def fourfold(rng: Rng) -> Form:
+    """Return a branch point with the symmetry of a square, eight curves beside the trivial one.
+
+    On the axes ``a r^2 = k sigma``, on the diagonals ``(a + b) r^2 = 2 k sigma``.
+    """
+    k, a = rng.uniform(0.1, 0.3), rng.uniform(0.6, 1.5)
+    b = a * rng.choice([rng.uniform(-0.5, 0.7), rng.uniform(1.4, 3)])
+    energy = -k * s * (x**2 + y**2) / 2 + a * (x**4 + y**4) / 4 + b * x**2 * y**2 / 2
+    arcs = [arc(lambda _: (0.0, 0.0), -REACH, 0, 0), arc(lambda _: (0.0, 0.0), 0, REACH, 2)]
+    for i in range(8):
+        one, two = np.cos(np.pi * i / 4), np.sin(np.pi * i / 4)
+        scale = k / a if i % 2 == 0 else 2 * k / (a + b)
+
+        def place(v: float, one: float = one, two: float = two, scale: float = scale) -> Any:
+            r = np.sqrt(max(scale * v, 0))
+            return r * one, r * two
+
+        arcs.append(arc(place, 0, REACH, int((b < a) == (i % 2 == 0))))
+    return Form(("x", "y"), (), energy, tuple(arcs), (event("BRANCH", arcs=range(10)),))
+
+
 def _simplex(rng: Rng, count: int, common: Any) -> tuple[list[Any], list[Any]]:
     """Return ``count`` functions whose sum is ``common``, and the coordinates they need."""
     ys = [sympy.Symbol(f"y{i}") for i in range(count - 1)]
@@ -206,11 +241,13 @@ def dependent(rng: Rng) -> Form:
     count, free = int(rng.integers(1, 4)), int(rng.integers(1, 3))
     xs = [sympy.Symbol(f"x{i}") for i in range(free)]
     a, e = rng.uniform(1.5, 3, free), rng.choice([-1, 1], free)
-    ys, functions = _simplex(rng, count, s + sum(float(c) * v**2 for c, v in zip(a * e, xs)))
+    ys, functions = _simplex(
+        rng, count, s + sum(float(c) * v**2 for c, v in zip(a * e, xs, strict=True))
+    )
     least = float(2 * a[0] * np.sqrt(REACH / a[0]))  # k over 2 a x is then above one half
     k = rng.uniform(1, 2) * least
     bends = rng.uniform(-0.5, 0.5, free)
-    energy = k * xs[0] + sum(float(c) * v**2 for c, v in zip(bends[1:], xs[1:]))
+    energy = k * xs[0] + sum(float(c) * v**2 for c, v in zip(bends[1:], xs[1:], strict=True))
     names = [f"g{i}" for i in range(count)]
     sign = float(e[0])
 
@@ -316,9 +353,9 @@ def several(rng: Rng) -> Form:
         kind = "OPENS" if kept > 0 else "CLOSES" if kept < 0 else "EXCHANGE"
     elif len(arcs) == 2:
         kind = "CORNER_LIMIT"
-    energy = sum(
-        float(h[i, j]) * vs[i] * vs[j] / 2 for i in range(n) for j in range(n)
-    ) - s * sum(float(c) * v for c, v in zip(g, vs, strict=True))
+    energy = sum(float(h[i, j]) * vs[i] * vs[j] / 2 for i in range(n) for j in range(n)) - s * sum(
+        float(c) * v for c, v in zip(g, vs, strict=True)
+    )
     return Form(
         tuple(v.name for v in vs), walls(*((f"c{i}", v) for i, v in enumerate(vs))), energy,
         tuple(arcs), (event(kind, arcs=range(len(arcs))),),
@@ -327,7 +364,7 @@ def several(rng: Rng) -> Form:
 
 FORMS = (
     regular, opens, grazes, corner_limit, fold, loop, pitchfork, transcritical, steep, dependent,
-    simplex, exchange, reentrant, several,
+    simplex, exchange, reentrant, several, threefold, fourfold,
 )  # fmt: skip
 PLAIN = (regular, held, bound)
 SWAPPED = {"OPENS": "CLOSES", "CLOSES": "OPENS"}
@@ -445,7 +482,7 @@ def connected(form: Form, first: int) -> tuple[list[KnownArc], list[KnownEvent]]
     ]
 
 
-def hidden(kind: str, form: Form, rng: Rng) -> Posed:
+def hidden(kind: str, form: Form, rng: Rng) -> Posed:  # noqa: PLR0915 - one change after the other
     """Return a form behind changes of coordinates, of the parameter and of units."""
     n = len(form.names)
     circles = rng.random(n) < 0.25
@@ -482,7 +519,9 @@ def hidden(kind: str, form: Form, rng: Rng) -> Posed:
         found, _, ok, _ = fsolve(
             lambda w: unhide(w * length, t)[0] - place, np.zeros(n), full_output=True, xtol=1e-13
         )
-        assert ok == 1 and (abs(found[circles]) < 1.2).all() and abs(found).max() < 3
+        assert ok == 1
+        assert (abs(found[circles]) < 1.2).all()
+        assert abs(found).max() < 3
         return found * length, t
 
     q0 = np.zeros(n)
@@ -511,8 +550,7 @@ def hidden(kind: str, form: Form, rng: Rng) -> Posed:
         AnyOf(*map(scaled, union)) if len(union) > 1 else scaled(union[0])
         for union in form.functions
     ]
-    for i in np.flatnonzero(circles):
-        parts.append(function(f"side{i}", sympy.cos(qs[i]) - 0.1))
+    parts += [function(f"side{i}", sympy.cos(qs[i]) - 0.1) for i in np.flatnonzero(circles)]
     for i in range(int(rng.integers(0, 3))):
         far = function(f"far{i}", 9 + ps[int(rng.integers(n))] * rng.choice([-1.0, 1.0]))
         if rng.random() < 0.3:
@@ -544,6 +582,7 @@ def drawn(first: Callable[[Rng], Form], rng: Rng) -> Posed:
             sign = int(rng.choice([-1, 1]))
             more = turned(renamed(other(rng), f"_{i + 1}"), sign, rng.uniform(-0.45, 0.45))
             form = added(form, more)
+    assert form.arcs
     assert len(form.names) <= 6
     values = sorted({e.at for e in form.events})
     assert np.diff(values).min(initial=1) > 1e-5

@@ -76,7 +76,7 @@ def _polished(near: FritzJohn, lost: int, *, steps: int = 12) -> BranchPoint | N
 
 
 def _forms(at: FritzJohn, left: Array, kernel: Array) -> BranchPoint:
-    h, k = at.system.tolerances.beside, len(at.x)
+    h, k = at.system.tolerances.near, len(at.x)
     change = [
         at.system.point(at.face, at.x + h * v[:k]).bordered
         - at.system.point(at.face, at.x - h * v[:k]).bordered
@@ -119,13 +119,18 @@ def _pair(point: BranchPoint, forms: Array, size: float, small: float) -> list[A
     speed = point.kernel[:, point.at.system.n]
     basis = np.linalg.svd(speed[None])[2]
     turned = np.einsum("ai,nij,bj->nab", basis, forms, basis)
-    if abs(turned[:, 1:, 1:]).max() > small or np.linalg.norm(speed) <= small:
+    mixed, plane = turned[:, 0, 1:], float(abs(turned[:, 1:, 1:]).max())
+    if np.linalg.norm(speed) <= small:
         return _common(forms, small)
-    mixed = turned[:, 0, 1:]
+    if plane > point.at.system.tolerances.corner:
+        # In units of the parameter in which both parts of the forms are alike.
+        unit = np.diag([plane / float(abs(mixed).max()), 1.0, 1.0])
+        zeros = _common(np.einsum("ai,nij,bj->nab", unit, turned, unit) / plane, small)
+        return None if zeros is None else [c @ unit @ basis for c in zeros]
     if abs(np.linalg.det(mixed)) <= small:
         return None
     through = np.array([1.0, *np.linalg.solve(mixed, -turned[:, 0, 0] / 2)])
-    cubic = _cubic(point, basis[1:], math.sqrt(small)) / size
+    cubic = _cubic(point, basis[1:], math.sqrt(point.at.system.tolerances.near)) / size
     # C(w) x l(w) = 0, of degree four in w = (x, y), the highest power of x first.
     crossed = np.convolve(cubic[0], mixed[1]) - np.convolve(cubic[1], mixed[0])
     slopes = _roots(crossed, small)

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from polycorner.branches.branching import branch_point
+from polycorner.branches.branching import branch_point, curves
 from polycorner.branches.system import FritzJohn
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.polyhedra.steppers import Stepper
@@ -65,9 +65,7 @@ def corrected(guess: P, across: Array, reach: float, *, steps: int = 8) -> P | N
     for _ in range(steps):
         if not at.finite:
             return None
-        matrix = np.vstack([at.jacobian, across])
-        left = np.append(at.left, across @ (at.x - start))
-        step = np.linalg.lstsq(matrix, -left, rcond=None)[0]
+        step = at.newton_step(across, float(across @ (at.x - start)))
         size, tolerances = float(np.linalg.norm(step)), at.system.tolerances
         at = at.moved(at.x + step)
         if np.linalg.norm(at.x - start) > reach or not at.finite:
@@ -83,8 +81,7 @@ def polished(at: P, j: int, *, steps: int = 8) -> P | None:
     start = at.x
     for _ in range(steps):
         values, slopes = at.watched()
-        matrix, left = np.vstack([at.jacobian, slopes[j]]), np.append(at.left, values[j])
-        step = np.linalg.lstsq(matrix, -left, rcond=at.system.tolerances.rounding)[0]
+        step = at.newton_step(slopes[[j]], float(values[j]))
         at = at.moved(at.x + step)
         if not at.finite or np.linalg.norm(at.x - start) > at.system.tolerances.beside:
             return None
@@ -131,12 +128,7 @@ class _Continuation(Stepper[P]):
                     if h > self.options.shortest_step:
                         continue
                     where, stop = point, Stop.LOST
-                ahead = where.tangent(self.t)
-                if stop is Stop.FLAT and self.chord(where) > self.system.tolerances.beside:
-                    # At a branch point it is not determined by the Jacobian.
-                    ahead = 2 * self.way(where) / self.chord(where) - self.t
-                    ahead /= np.linalg.norm(ahead)
-                self.move(where, ahead)
+                self.move(where, where.tangent(self.t))
                 return self._course(stop)
             home = self._home(point)
             self.move(point, t)
@@ -250,8 +242,16 @@ class _Continuation(Stepper[P]):
         return bool(passes and np.linalg.norm(aside) < self.options.turn / 2 * self.chord(point))
 
 
+Found = tuple[float, FritzJohn, Stop | None]  # part of the way, a point, what is there
+
+
 class _ArcContinuation(_Continuation[FritzJohn]):
-    def _flat(self, point: FritzJohn, t: Array) -> list[tuple[float, FritzJohn, Stop | None]]:
+    def _flat(self, point: FritzJohn, t: Array) -> list[Found]:
+        """Return where a curvature vanishes or the parameter turns back on the way to a point."""
+        found = self._first_flat(point, t)
+        return [] if found is None else [found]
+
+    def _first_flat(self, point: FritzJohn, t: Array) -> Found | None:
         """Return where a curvature vanishes on the way to a point, or the parameter turns back.
 
         Without a stop where more than one of these happens.  Both signs of the same curvatures may
@@ -259,26 +259,77 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         may turn twice, which a cubic through its values and slopes tells.
         """
         n, beside = self.system.n, self.system.tolerances.beside
-        several: tuple[float, FritzJohn, Stop | None] = (0.5, point, None)
+        several: Found = (0.5, point, None)
         before, after = float(self.t[n]), float(t[n])
-        one, two = self.point.falling, point.falling
         change, h = point.s - self.point.s, self.chord(point)
-        if len(self.passed) == 1 and (abs(before) <= beside or self._is_flat()):
+        if len(self.passed) == 1 and (abs(before) <= beside or self.point.definite <= beside / 10):
             # It leaves a fold or a branch point: signs are those beyond.
-            return [several] if after * change < 0 and h > beside else []
-        if before * after < 0 and max(abs(before), abs(after)) > self.system.tolerances.same:
-            return [(*self._turned(point, t), Stop.FLAT)]
-        if len(one) == len(two):
-            across = np.linalg.svd(one @ two.T, compute_uv=False).min(initial=1.0)
-            twice = _turns((h * before, h * after), change) or self._dips(point, t)
-            if across > 0.5 and not (twice and h > beside):
-                return []
-        elif abs(len(one) - len(two)) == 1:
-            return [(*self._flattened(point, 0, min(len(one), len(two))), Stop.FLAT)]
+            turned = after * change < 0 and abs(after) > self.system.tolerances.same
+            return several if turned and h > beside else None
+        # Where a corner stays and multipliers move, the parameter's change is rounding.
+        moves = max(abs(before), abs(after)) > self.system.tolerances.same
+        if before * after < 0 and moves:
+            return self._confirmed(*self._turned(point, t), point)
+        if self.system.is_sparse:
+            return self._flat_sparsely(point, t)
+        change_of_index = abs(self.point.index - point.index)
+        if change_of_index == 1:
+            k = min(self.point.index, point.index)
+            return self._confirmed(*self._flattened(point, 0, k), point)
+        if not change_of_index and self._same_directions(point):
+            twice = (moves and _turns((h * before, h * after), change)) or self._dips(point, t)
+            if not twice:
+                return None
         if h > beside:
-            return [several]
+            return several
         branching = branch_point(point)
-        return [] if branching is None else [(0.5, branching.at, Stop.FLAT)]
+        return None if branching is None else (0.5, branching.at, Stop.FLAT)
+
+    def _confirmed(self, s: float, at: FritzJohn, point: FritzJohn) -> Found | None:
+        """Return an event of a curvature, or a request for shorter steps where it is none.
+
+        None where it is the branch point from which the curve has just come.
+        """
+        if at.is_fold(self.t):
+            return s, at, Stop.FLAT
+        found = None if self.system.is_sparse else branch_point(at)
+        if found is not None:
+            same, beside = self.system.tolerances.same, self.system.tolerances.beside
+            if self.length <= beside and np.linalg.norm(found.at.x - self.passed[0].x) <= same:
+                return None
+            # Near enough to tell by its direction along which curve it is reached.
+            chord = self.chord(found.at)
+            ahead = 2 * (found.at.x - self.point.x) / chord - self.t
+            straight = math.cos(self.options.turn / 2) * float(np.linalg.norm(ahead))
+            tangents = curves(found)[0]
+            along = max((float(abs(v @ ahead)) for v in tangents), default=math.inf)
+            if along >= straight or chord <= 2 * self.system.tolerances.near:
+                return s, found.at, Stop.FLAT
+            return 0.5, point, None
+        if self.chord(point) > self.system.tolerances.beside:
+            return 0.5, point, None
+        exact = abs(at.left).max() <= self.system.tolerances.zero
+        return s, at if exact else self.point, Stop.FLAT
+
+    def _flat_sparsely(self, point: FritzJohn, t: Array) -> Found | None:
+        """Return where the index changes, by bisection; directions are not looked at."""
+        if point.index == self.point.index:
+            again = self.chord(point) > self.system.tolerances.beside and self._dips(point, t)
+            return (0.5, point, None) if again else None
+
+        def value(s: float) -> tuple[float, FritzJohn]:
+            at = self._between(point, s)
+            return 1.0 if at.index == self.point.index else -1.0, at
+
+        def enough(_at: FritzJohn, _value: float, left: float) -> bool:
+            return left < self.system.tolerances.same
+
+        return self._confirmed(*sign_change(value, enough=enough), point)
+
+    def _same_directions(self, point: FritzJohn) -> bool:
+        """Whether the directions of negative curvature turn little on the way to a point."""
+        one, two = self.point.falling, point.falling
+        return bool(np.linalg.svd(one @ two.T, compute_uv=False).min(initial=1.0) > 0.5)
 
     def _dips(self, point: FritzJohn, t: Array) -> bool:
         """Whether a curvature may have touched zero on the way to a point.
@@ -286,12 +337,13 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         That is so where a step has jumped from one curve through a branch point to another.
         """
         h, low = self.chord(point), self.point.curvatures()
-        if len(low) == 0:
-            return False
-        side = np.where(low < 0, -1.0, 1.0)
-        values = side * low, side * point.curvatures()
-        slopes = side * self._bending(self.point, self.t), side * self._bending(point, t)
-        return bool(may_vanish(values, slopes, h * (abs(slopes[0]) + abs(slopes[1])), h))
+        side, high = np.where(low < 0, -1.0, 1.0), point.curvatures()
+        f0, f1 = side * low, side * high
+        out, back = side * self._bending(self.point, self.t) * h, side * self._bending(point, t) * h
+        # Tangents show corners of the graph, and curvatures may change their order on the way.
+        # They are followed half as far again, as the step may end just beyond the branch point.
+        falls, rises = (out < 0) & (f0 + 1.5 * out < 0), (back > 0) & (f1 - 1.5 * back < 0)
+        return bool(falls.any() and rises.any())
 
     def _bending(self, at: FritzJohn, t: Array) -> Array:
         """Return the derivatives of the curvatures along a tangent."""
@@ -307,10 +359,6 @@ class _ArcContinuation(_Continuation[FritzJohn]):
             return float(at.tangent((1 - s) * self.t + s * t)[self.system.n]), at
 
         return sign_change(value)
-
-    def _is_flat(self) -> bool:
-        curvatures = abs(self.point.curvatures())
-        return bool(curvatures.min(initial=math.inf) <= self.system.tolerances.near)
 
 
 def _turns(slopes: tuple[float, float], change: float) -> bool:
@@ -343,5 +391,6 @@ def follow(
     most : int, optional
         Steps, at most.
     """
-    kind: type[_Continuation[Any]] = _ArcContinuation if type(start) is FritzJohn else _Continuation
+    arc = type(start) is FritzJohn or start.system.is_sparse
+    kind: type[_Continuation[Any]] = _ArcContinuation if arc else _Continuation
     return kind(start, direction, options, extent, most).run()

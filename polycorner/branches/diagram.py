@@ -14,7 +14,7 @@ from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.methods import stationary_on
 from polycorner.minimisation.parametric import problem_with
 from polycorner.minimisation.problem import Problem
-from polycorner.printing import Printed, Sheet, listed, number
+from polycorner.printing import Printed, Sheet, few, listed, number
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked, cached_property
@@ -227,7 +227,7 @@ class Diagram(Checked, Printed):
             (
                 str(k),
                 f"{number(arc.parameters[0], 6)} to {number(arc.parameters[-1], 6)}",
-                ", ".join(arc.active) or "nothing",
+                few(arc.active) if arc.active else "nothing",
                 "minimum" if arc.stable else f"index {arc.index}",
             )
             for k, arc in enumerate(self.arcs)

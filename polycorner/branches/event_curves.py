@@ -29,8 +29,9 @@ from polycorner.branches.continuation import Course, Stop, corrected, follow
 from polycorner.branches.diagram import BranchEvent, BranchKind, Diagram
 from polycorner.branches.event_map import EventCurve, EventMap, MeetingKind, MeetingPoint
 from polycorner.branches.event_points import FOLD, SYMMETRIC, EventPoint, kind_and_gain
+from polycorner.branches.posing import posed
 from polycorner.branches.search import interval_ends
-from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem, posed
+from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
 from polycorner.kinds import checked
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
@@ -319,6 +320,8 @@ def event_curves(
     checks.real("max_seconds", max_seconds, above=0, infinite=True)
     checks.whole("max_curves", max_curves, least=1)
     problem, name = diagram.problem, parameter if isinstance(parameter, str) else "change"
+    if problem.is_sparse:
+        checks.refuse("diagram", "one of a small polyhedron", repr(diagram))
     second = {parameter: 1.0} if isinstance(parameter, str) else dict(parameter)
     problem.check_parameters(second)
     now = next(iter(problem.parameter_values[name])) if isinstance(parameter, str) else 0.0

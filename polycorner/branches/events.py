@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from itertools import chain, combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.branches.branching import branch_point, curves
 from polycorner.branches.continuation import Course, Stop
@@ -57,7 +58,7 @@ class Node:
     @property
     def decided(self) -> bool:
         """Whether all that leaves it is known."""
-        return not self.notes and self.kind is not BranchKind.UNDECIDED
+        return not self.notes and not (self.arms and kind_of(self) is BranchKind.UNDECIDED)
 
 
 def event_at_end(way: Course[FritzJohn]) -> Node:
@@ -70,7 +71,7 @@ def event_at_end(way: Course[FritzJohn]) -> Node:
     if way.stop is Stop.EVENT:
         return weak_event(at)
     node = flat_event(at, way.tangent)
-    vanish = abs(node.at.watched()[0]) <= 10 * at.system.tolerances.zero
+    vanish = abs(node.at.watched()[0]) <= at.system.tolerances.same
     return weak_event(node.at) if vanish.any() else node
 
 
@@ -80,9 +81,10 @@ def weak_event(at: FritzJohn, most: int = 10) -> Node:
     values, small = at.watched()[0], at.system.tolerances.same
     vanish = abs(values) <= small
     weak = tuple(np.flatnonzero(vanish[:m]).tolist())
-    if vanish[m + 1 :].any():
-        return Node(at, BranchKind.END, weak)
-    node = Node(at, TOLD, weak)
+    ends = bool(vanish[m + 1 :].any())
+    node = Node(at, BranchKind.END if ends else TOLD, weak)
+    if ends and not weak:
+        return node
     if len(weak) > most:
         node.notes.append(f"{len(weak)} functions vanish there, more than {most}")
         return node
@@ -93,29 +95,31 @@ def weak_event(at: FritzJohn, most: int = 10) -> Node:
         face = tuple(sorted(firm.union(chosen)))
         for sign in signs:
             x = system.guess(face, at.u, at.s, sign * at.mu)
-            node.arms += _leaving(system.point(face, x), node, also=bool(vanish[m]))
+            node.arms += _leaving(system.point(face, x), node, m + np.flatnonzero(vanish[m:]))
+    if system.is_sparse and vanish[m]:
+        node.notes.append("the energy's multiplier vanishes, in a sparse problem")
     return node
 
 
-def _leaving(here: FritzJohn, node: Node, *, also: bool) -> Iterator[Arm]:
+def _leaving(here: FritzJohn, node: Node, also: NDArray[np.intp]) -> Iterator[Arm]:
     """Yield the arcs of a face that leave an event where functions vanish."""
     system, m = here.system, here.system.problem.inequalities
-    sizes, vectors = here.kernel()
-    if sizes[1] <= system.tolerances.dependent:
+    t = here.only_tangent()
+    if t is None:
         node.notes.append("several curves of one face cross where functions vanish")
         return
     values, slopes = here.watched()
-    t, weak = vectors[0], list(node.weak)
+    weak = list(node.weak)
     rates = slopes @ t
     least = system.tolerances.same
-    if (abs(rates[[*weak, *([m] if also else [])]]) <= least).any():
+    if (abs(rates[[*weak, *also]]) <= least).any():
         node.notes.append("something vanishes to second order")
         return
     for side in (1.0, -1.0):
         away = np.sign(values[:m])  # what does not vanish there is far, whatever its size
         away[weak] = side * rates[weak]
         held = list(here.face)
-        pressed = (away[held] > 0).all() and (not also or side * rates[m] > 0)
+        pressed = (away[held] > 0).all() and (side * rates[also] > 0).all()
         away[held] = 0.0
         pieces = local_pieces(
             system.problem.polyhedron, np.concatenate([away, np.zeros(system.others)]), least / 2
@@ -126,12 +130,10 @@ def _leaving(here: FritzJohn, node: Node, *, also: bool) -> Iterator[Arm]:
 
 def flat_event(at: FritzJohn, t: Array) -> Node:
     """Return the event where a curvature along the face vanishes, with the tangent of arrival."""
-    found, n = branch_point(at), at.system.n
+    if at.is_fold(t):
+        return Node(at, BranchKind.FOLD, arms=[Arm(at.face, at.tangent(t))])
+    found = None if at.system.is_sparse else branch_point(at)
     if found is None:
-        turns = at.tangent(t)
-        exact = abs(at.left).max() <= at.system.tolerances.zero
-        if exact and abs(turns[n]) <= at.system.tolerances.near:
-            return Node(at, BranchKind.FOLD, arms=[Arm(at.face, turns)])
         note = "a curvature vanishes, but neither a fold nor a branch point was found"
         return Node(at, BranchKind.UNDECIDED, notes=[note])
     node = Node(found.at, BranchKind.BRANCH)
@@ -145,7 +147,7 @@ def kind_of(node: Node) -> BranchKind:
     """Return the kind of an event, by what leaves it."""
     if node.kind is not TOLD:
         return node.kind
-    if node.notes:
+    if node.notes or not node.arms:
         return BranchKind.UNDECIDED
     n, m = node.at.system.n, node.at.system.problem.inequalities
     if len(node.arms) == 1:
@@ -169,8 +171,9 @@ def _is_point(at: FritzJohn) -> bool:
     small = 10 * system.tolerances.zero
     if not rows or len(local_pieces(system.problem.polyhedron, at.known.values[:-1], small)) != 1:
         return False
-    held = unit_rows(at.known.gradients[[*rows, *system.equations], :n])
-    basis = null_space(np.vstack([held, at.orbit]), system.tolerances.rank)
+    held = at.known.gradients[[*rows, *system.equations], :n]
+    held = held[np.linalg.norm(held, axis=1) > system.tolerances.same]
+    basis = null_space(np.vstack([unit_rows(held), at.orbit]), system.tolerances.rank)
     bent = np.einsum("i,ijk->jk", at.mu[:-1], at.known.hessians[:-1, :n, :n])
     values = np.linalg.eigvalsh(basis.T @ bent @ basis)
     return bool((values < -system.tolerances.same).all())

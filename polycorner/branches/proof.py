@@ -171,8 +171,8 @@ def prove_branches(
     """
     checks.instance("diagram", diagram, Diagram)
     d = diagram.problem.polyhedron
-    if d.is_union or d.manifold.factors:
-        expected = "one of an intersection, on lines and circles"
+    if d.is_union or d.manifold.factors or diagram.problem.is_sparse:
+        expected = "one of an intersection, on lines and circles, of few coordinates"
         checks.refuse("diagram", expected, repr(d))
     sides = None if box is None else domain(d.manifold, box)
     chosen = options or BranchProofOptions()

@@ -18,7 +18,8 @@ from polycorner.branches.events import (
     kind_of,
     weak_event,
 )
-from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem, posed
+from polycorner.branches.posing import posed
+from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
 from polycorner.kinds import checked
 from polycorner.minimisation.certificate import Certificate
 from polycorner.polyhedra.quotients import WalkOptions
@@ -57,6 +58,8 @@ class _BranchSearch:
     def begin_at_event(self, at: FritzJohn) -> None:
         """Take an equilibrium on which functions vanish without a multiplier."""
         node = weak_event(at)
+        if not node.arms and not node.notes:
+            node.notes.append("no arc leaves it")
         if self._known(node) is None:
             self.nodes.append(node)
 
@@ -98,6 +101,8 @@ class _BranchSearch:
         node = self.nodes[k]
         self.edges[edge].ends[end] = k
         alike = math.cos(self.options.turn)
+        if node.kind is BranchKind.BRANCH:
+            back = _backwards(way, node.at)
         if node.at.face == face:
             self.edges[edge].points[-end] = node.at
         arms = [arm for arm in node.arms if arm.face == face and arm.direction @ back > alike]
@@ -112,18 +117,18 @@ class _BranchSearch:
     def _known(self, node: Node) -> int | None:
         near = self.system.tolerances.corner
         for k, other in enumerate(self.nodes):
-            if other.weak == node.weak and other.at.apart(node.at) <= near:
+            alike = other.weak == node.weak and other.kind is node.kind
+            if alike and other.at.apart(node.at) <= near:
                 return k
         return None
 
     def _passes(self, edge: _Edge, at: FritzJohn) -> bool:
         """Whether an arc goes through a point."""
-        n = self.system.n
         for one, two in zip(edge.points, edge.points[1:], strict=False):
             if edge.face != at.face or not (one.s - at.s) * (two.s - at.s) <= 0:
                 continue
             part = (at.s - one.s) / ((two.s - one.s) or 1.0)
-            pin = np.eye(len(at.x))[n]
+            pin = self.system.towards(at.x)
             found = corrected(at.moved(one.x + part * (two.x - one.x)), pin, math.inf)
             if found is not None and found.apart(at) <= self.system.tolerances.near:
                 return True
@@ -143,7 +148,7 @@ class _BranchSearch:
             kept.weak = tuple(sorted({*kept.weak, *gone.weak}))
             kept.notes += gone.notes
             kept.arms = [arm for arm in (*kept.arms, *gone.arms) if arm.arc != k]
-            gone.arms, edge.points = [], []
+            gone.arms, gone.notes, edge.points = [], [], []
             self._redirect(two, one)
         for k, node in enumerate(self.nodes):
             arms = node.arms
@@ -173,6 +178,19 @@ class _BranchSearch:
         for node in self.nodes:
             for arm in node.arms:
                 arm.arc = one if arm.arc == two else arm.arc
+
+
+def _backwards(way: Course[FritzJohn], end: FritzJohn) -> np.ndarray:
+    """Return the unit tangent at a branch point, where the Jacobian gives none, towards an arc.
+
+    That of the parabola through the point with the tangent of the last point beside it.
+    """
+    least = end.system.tolerances.near
+    away = [np.linalg.norm(end.x - at.x) for at in way.points]
+    k = max((k for k, length in enumerate(away) if length >= least), default=0)
+    chord = (end.x - way.points[k].x) / (away[k] or 1.0)
+    back = way.points[k].tangent(chord) - 2 * chord
+    return np.asarray(back / np.linalg.norm(back))
 
 
 @checked
@@ -289,8 +307,6 @@ def _system(
     symmetry: Symmetry,
 ) -> FritzJohnSystem:
     problem, (low, high) = certificate.problem, interval
-    if problem.is_sparse:
-        checks.refuse("certificate", "one of a small polyhedron", repr(certificate))
     now = _value(certificate, rates, parameter)
     if not low <= now <= high:
         checks.refuse("interval", f"one that contains {now:g}, of the certificate", interval)
@@ -333,7 +349,7 @@ def _start(
     face = tuple(i for i in a.active if i not in weak)
     u = certificate.point / system.manifold.scale_array
     x = system.guess(face, u, s, lam / np.linalg.norm(lam))
-    found = corrected(system.point(face, x), np.eye(len(x))[system.n], math.inf)
+    found = corrected(system.point(face, x), system.towards(x), math.inf)
     if found is None:
         expected = "an equilibrium that is isolated, modulo the symmetry, at its parameter"
         checks.refuse("certificate", expected, repr(certificate))
@@ -343,10 +359,11 @@ def _start(
 def _index(points: Sequence[FritzJohn]) -> int:
     """Return the index between the ends of an arc, at which curvatures may vanish."""
     one, two = points[0], points[-1]
-    middle = one.moved((one.x + two.x) / 2)
-    inner = points[1:-1] or [corrected(middle, two.x - one.x, math.inf) or middle]
-    best = max(inner, key=lambda at: float(abs(at.curvatures()).min(initial=math.inf)))
-    return len(best.falling)
+    inner, half = points[1:-1], len(points) // 2
+    if not inner:
+        middle = one.moved((one.x + two.x) / 2)
+        inner = [corrected(middle, two.x - one.x, math.inf) or middle]
+    return max([*inner[half:], *inner[:half]], key=lambda at: at.definite).index
 
 
 def _key(points: Sequence[FritzJohn]) -> tuple[float, ...]:
@@ -373,7 +390,7 @@ def _diagram(
         key=lambda k: _key(search.edges[k].points),
     )
     shown = sorted(
-        (k for k, node in enumerate(search.nodes) if node.arms),
+        (k for k, node in enumerate(search.nodes) if node.arms or node.notes),
         key=lambda k: _key([search.nodes[k].at]),
     )
     arc_of = {k: j for j, k in enumerate(kept)}
@@ -409,8 +426,8 @@ def _diagram(
                 kind=kind_of(node),
                 parameter=float(np.interp(node.at.s, (0, length), (low, high))),
                 point=system.manifold.canonical(system.place(node.at.u)),
-                before=tuple(names[i] for i in arms[0].face),
-                after=tuple(names[i] for i in arms[-1].face),
+                before=tuple(names[i] for i in (arms[0] if arms else node.at).face),
+                after=tuple(names[i] for i in (arms[-1] if arms else node.at).face),
                 functions=tuple(names[i] for i in node.weak),
                 arcs=tuple(arc_of[arm.arc] for arm in arms if arm.arc in arc_of),
                 note="; ".join(dict.fromkeys(node.notes)),

@@ -19,22 +19,17 @@ arc ends where one of these vanishes, and there exactly one arc of another face 
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from polycorner.minimisation.parametric import lifted_problem
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import null_space, unit_rows
-from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import Tolerances
 from polycorner.values import cached_property
-
-UNITS = 5.0  # of the continuation in an interval: a step is at most a tenth of it by default
 
 Face = tuple[int, ...]  # positions of the inequalities that are held, in ascending order
 
@@ -92,6 +87,11 @@ class FritzJohnSystem:
         return self.problem.polyhedron.is_union
 
     @property
+    def is_sparse(self) -> bool:
+        """Whether matrices are sparse."""
+        return False
+
+    @property
     def others(self) -> int:
         """The number of equations."""
         return self.problem.rows - self.problem.inequalities - 1
@@ -123,6 +123,16 @@ class FritzJohnSystem:
             onto.T @ (hessians / size[:, :, None]) @ onto,
         )
 
+    def sized(self, u: Array, s: Array | float) -> Array:
+        """Return the sizes of all first and second derivatives, one for those that vanish."""
+        values, *derivatives = self.at(u, s)
+        first, second = (np.linalg.norm(d.reshape(len(d), -1), axis=1) for d in derivatives)
+        # The curvature of a distance of parallel segments is none by which to measure it.
+        level = np.append(abs(values[:-1]) + first[:-1], math.inf)
+        bent = level <= self.tolerances.zero * second
+        sizes = first + np.where(bent, second, np.minimum(second, level))
+        return np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0)
+
     def orbit(self, u: Array) -> Array:
         """Return the scaled tangent vectors of the continuous symmetries, ``(g, n)``."""
         if self.symmetry.tangents is None and not self.symmetry.fields:
@@ -136,6 +146,12 @@ class FritzJohnSystem:
     def guess(self, face: Face, u: Array, s: Array | float, mu: Array) -> Array:
         """Return the vector of unknowns ``(u, s, mu)`` on a face, of multipliers of all rows."""
         return np.concatenate([u, np.atleast_1d(s), mu[self.rows(face)]])
+
+    def towards(self, x: Array) -> Array:
+        """Return the unit vector of unknowns in which the parameter grows."""
+        along = np.zeros(len(x))
+        along[self.n] = 1.0
+        return along
 
     def point(self, face: Face, x: Array) -> "FritzJohn":
         """Return the residual and the derivatives of the equations at a guess."""
@@ -158,6 +174,8 @@ class FritzJohn:
     finite : bool
         Whether all are.
     """
+
+    jacobian: Any
 
     def __init__(self, system: FritzJohnSystem, face: Face, x: Array) -> None:
         self.system, self.face, self.x = system, face, x
@@ -211,6 +229,30 @@ class FritzJohn:
         parts = (moved, self.mu - other.mu, self.both - other.both)
         return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
+    def newton_step(self, row: Array, value: float) -> Array:
+        """Return Newton's step for the equations and one more, with its derivatives and value."""
+        matrix, left = np.vstack([self.jacobian, row]), np.append(self.left, value)
+        rcond = self.system.tolerances.rounding
+        return np.asarray(np.linalg.lstsq(matrix, -left, rcond=rcond)[0])
+
+    @property
+    def margin(self) -> float:
+        """How far the point is from those where several curves may cross: a singular value."""
+        return float(self.kernel()[0][1])
+
+    def only_tangent(self) -> Array | None:
+        """Return a unit vector along the curve, or None where several curves may cross."""
+        return None if self.margin <= self.system.tolerances.dependent else self.kernel()[1][0]
+
+    def is_fold(self, like: Array) -> bool:
+        """Whether this is a regular point of a curve on which the parameter stays."""
+        tolerances = self.system.tolerances
+        if abs(self.left).max() > tolerances.zero or self.only_tangent() is None:
+            return False
+        # Beside a branch point the parameter nearly stays too, but so does all that is singular.
+        least = tolerances.near * min(1.0, self.margin)
+        return bool(abs(self.tangent(like)[self.system.n]) <= least)
+
     def kernel(self) -> tuple[Array, Array]:
         """Return singular values ``(N,)``, ascending, and their vectors, of the Jacobian."""
         _, values, vectors = np.linalg.svd(self.jacobian)
@@ -244,10 +286,27 @@ class FritzJohn:
         return np.asarray(np.linalg.eigvalsh(basis.T @ self.curvature @ basis))
 
     @property
+    def index(self) -> int:
+        """The number of negative curvatures along the face."""
+        return len(self.falling)
+
+    @property
+    def definite(self) -> float:
+        """How far the curvatures are from zero."""
+        return float(abs(self.curvatures()).min(initial=math.inf))
+
+    @property
     def falling(self) -> Array:
         """The directions along the face of negative curvature, ``(i, n)``."""
         values, vectors = self.spectrum
         return vectors[values < 0]
+
+    def _watched_values(self) -> Array:
+        system, m = self.system, self.system.problem.inequalities
+        ends = [self.both, system.length - self.both]
+        values = np.concatenate([self.known.values[:m], self.x[-1:], *ends])
+        values[[*self.face]] = self.mu[[*self.face]]
+        return values
 
     def watched(self) -> tuple[Array, Array]:
         """Return what must not be negative along an arc ``(m + 1 + 2 d,)``, and derivatives by x.
@@ -255,11 +314,8 @@ class FritzJohn:
         These are, row by row, the values of the open inequalities and the multipliers of the held
         ones; the multiplier of the energy; and the parameters' distances from both ends.
         """
-        system, n, p = self.system, self.system.n, self.system.n + self.system.d
-        m, face = system.problem.inequalities, list(self.face)
-        ends = [self.both, system.length - self.both]
-        values = np.concatenate([self.known.values[:m], self.x[-1:], *ends])
-        values[face] = self.mu[face]
+        n, p = self.system.n, self.system.n + self.system.d
+        values, m, face = self._watched_values(), self.system.problem.inequalities, [*self.face]
         slopes = np.zeros((len(values), len(self.x)))
         slopes[:m, :p] = self.known.gradients[:m]
         slopes[face] = 0.0
@@ -267,50 +323,3 @@ class FritzJohn:
         slopes[m, -1] = 1.0
         slopes[m + 1 :, n:p] = np.vstack([np.eye(p - n), -np.eye(p - n)])
         return values, slopes
-
-
-def posed(
-    problem: Problem,
-    rates: Sequence[Mapping[str, float]],
-    intervals: Sequence[tuple[float, float]],
-    now: Sequence[float],
-    q: Array,
-    symmetry: Symmetry,
-    tolerances: Tolerances,
-) -> FritzJohnSystem:
-    """Return the equations over an interval of each parameter, sized at a point.
-
-    Parameters
-    ----------
-    problem : Problem
-        At the values ``now`` of the parameters.
-    rates : sequence of mapping from str to float
-        For each parameter the derivatives of the formulas' parameters by it.
-    intervals : sequence of (float, float)
-    now : sequence of float
-    q : (n,) array
-    symmetry : Symmetry
-    tolerances : Tolerances
-    """
-    names = tuple(dict.fromkeys(name for some in rates for name in some))
-    speeds = np.array([[some.get(name, 0.0) for some in rates] for name in names])
-    values = np.array([next(iter(problem.parameter_values[name])) for name in names])
-    whole, (low, high) = lifted_problem(problem, names), np.transpose(intervals)
-    system = FritzJohnSystem(
-        problem=whole,
-        manifold=problem.polyhedron.manifold,
-        start=values + speeds @ (low - now),
-        rates=speeds * (high - low) / UNITS,
-        length=UNITS,
-        sizes=np.ones(whole.rows),
-        equations=tuple(independent_equations(problem.polyhedron, [q])),
-        symmetry=symmetry,
-        tolerances=tolerances,
-    )
-    known = system.at(q / problem.scales, (now - low) / (high - low) * UNITS)
-    first, second = (np.linalg.norm(d.reshape(len(d), -1), axis=1) for d in known[1:])
-    # The curvature of a distance of parallel segments is none by which to measure it.
-    level = np.append(abs(known.values[:-1]) + first[:-1], math.inf)
-    bent = level <= tolerances.zero * second
-    sizes = first + np.where(bent, second, np.minimum(second, level))
-    return replace(system, sizes=np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0))

@@ -158,19 +158,7 @@ class Lifted:
         self.slots = slots_of((*held, *terms))
         self._scales = problem.scales
         self._values = np.array([value for _, value in self.slots])
-        self._functions = self._raise((*held, *terms))
-
-    def _raise(self, functions: Sequence[SmoothFunction]) -> list[_Raised]:
-        used: dict[Family, set[str]] = {}
-        for f in functions:
-            used.setdefault(f.family, set()).add(f.member_name)
-        families = {family: lifted_family(family, frozenset(used[family])) for family in used}
-        n, raised = len(self._scales), []
-        for f in functions:
-            slots = zip(f.family.parameters, f.parameters, strict=True)
-            own = [n + self.slots[slot] for slot in slots]
-            raised.append(_Raised(families[f.family], f.member_name, (*f.reads, *own)))
-        return raised
+        self._functions = raised((*held, *terms), self.slots, len(self._scales))
 
     @cached_property
     def _bundle(self) -> Bundle:
@@ -239,6 +227,21 @@ def slots_of(functions: Iterable[SmoothFunction]) -> dict[tuple[str, float], int
         for slot in zip(f.family.parameters, f.parameters, strict=True):
             slots.setdefault(slot, len(slots))
     return slots
+
+
+def raised(
+    functions: Sequence[SmoothFunction], slots: Mapping[tuple[str, float], int], n: int
+) -> list[_Raised]:
+    """Return functions of ``n`` coordinates and of the slots after them."""
+    used: dict[Family, set[str]] = {}
+    for f in functions:
+        used.setdefault(f.family, set()).add(f.member_name)
+    families = {family: lifted_family(family, frozenset(used[family])) for family in used}
+    found = []
+    for f in functions:
+        own = [n + slots[slot] for slot in zip(f.family.parameters, f.parameters, strict=True)]
+        found.append(_Raised(families[f.family], f.member_name, (*f.reads, *own)))
+    return found
 
 
 @lru_cache(maxsize=256)

@@ -29,7 +29,7 @@ def followed(case):
     return diagram(functions, energy, start, value)
 
 
-@pytest.mark.parametrize("case", CASES.keys() - CROSSINGS)
+@pytest.mark.parametrize("case", sorted(CASES.keys() - CROSSINGS))
 def test_normal_forms_are_complete(case):
     kind, where = CASES[case][4:6]
     p = prove_branches(followed(case), box=BOX)

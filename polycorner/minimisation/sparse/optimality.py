@@ -142,6 +142,12 @@ def nondegenerate(hessian: csr_array, rows: csr_array, small: float) -> bool:
     return least is not None and least == _negative(hessian, rows, -small, -delta)
 
 
+def index_along(hessian: csr_array, rows: csr_array) -> int | None:
+    """Return the number of negative eigenvalues along ``{A d = 0}``, or None if undecided."""
+    found = _negative(hessian, rows, 0.0, -_corner(hessian))
+    return None if found is None else found - rows.shape[0]
+
+
 def _corner(hessian: Any) -> float:
     return 1.0 / (PENALTY * (float(abs(hessian).max()) or 1.0))
 
