@@ -300,10 +300,13 @@ class Polyhedron(Printed, Value):
         without : sequence of str, optional
             Names of inequalities that are left out.
         """
+        checks.names("without", without, self.names)
         left = frozenset(self.names.index(name) for name in without)
         tree = _grouped(self.tree, self.functions, left)
-        more = collect(self.manifold, "parts", parts, "g")[0].parts
-        every = collect(self.manifold, "equations", equations, "k")[0].parts
+        with checks.about("parts"):
+            more = collect(self.manifold, "parts", parts, "g")[0].parts
+        with checks.about("equations"):
+            every = collect(self.manifold, "equations", equations, "k")[0].parts
         whole = [part for part in (tree, *more) if part is not None]
         return Polyhedron(
             self.manifold, whole, [*self.stated, *every], annotations=self.annotations

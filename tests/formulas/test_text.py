@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
+from diagrams import leaning_well
 from landscape_values import double_well
 
 import polycorner
@@ -38,8 +39,10 @@ from polycorner.bodies import (
 from polycorner.dumbbells.viewer import descent
 from polycorner.files import (
     load_certificate,
+    load_diagram,
     load_landscape,
     save_certificate,
+    save_diagram,
     save_landscape,
     save_problem,
 )
@@ -120,6 +123,10 @@ CASES = {
     "load_landscape.energy": (
         "energy",
         lambda e, folder: load_landscape(save_landscape(double_well(), folder / "l.json"), D, e),
+    ),
+    "load_diagram.energy": (
+        "energy",
+        lambda e, folder: load_diagram(save_diagram(leaning_well(), folder / "b.json"), D, e),
     ),
     "load_certificate.energy": (
         "energy",
