@@ -6,6 +6,7 @@ vanishes, where a curvature along the face does, or where the curve comes back t
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Generic, TypeVar
@@ -265,7 +266,8 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         if len(self.passed) == 1 and (abs(before) <= beside or self.point.definite <= beside / 10):
             # It leaves a fold or a branch point: signs are those beyond.
             turned = after * change < 0 and abs(after) > self.system.tolerances.same
-            return several if turned and h > beside else None
+            again = turned or not self._is_steady(point, 0.25 ** np.arange(1.0, 5.0), point.index)
+            return several if again and h > beside else None
         # Where a corner stays and multipliers move, the parameter's change is rounding.
         moves = max(abs(before), abs(after)) > self.system.tolerances.same
         if before * after < 0 and moves:
@@ -290,6 +292,12 @@ class _ArcContinuation(_Continuation[FritzJohn]):
 
         None where it is the branch point from which the curve has just come.
         """
+        # Else there is another event before.
+        parts = (s / 2, 7 * s / 8, 0.999 * s)
+        if self.chord(point) > self.system.tolerances.beside and not self._is_steady(
+            point, parts, self.point.index
+        ):
+            return 0.5, point, None
         if at.is_fold(self.t):
             return s, at, Stop.FLAT
         found = None if self.system.is_sparse else branch_point(at)
@@ -310,6 +318,10 @@ class _ArcContinuation(_Continuation[FritzJohn]):
             return 0.5, point, None
         exact = abs(at.left).max() <= self.system.tolerances.zero
         return s, at if exact else self.point, Stop.FLAT
+
+    def _is_steady(self, point: FritzJohn, parts: Iterable[float], index: int) -> bool:
+        """Whether the index is the given one at parts of the way to a point."""
+        return all(self._between(point, s).index == index for s in parts)
 
     def _flat_sparsely(self, point: FritzJohn, t: Array) -> Found | None:
         """Return where the index changes, by bisection; directions are not looked at."""
