@@ -163,8 +163,14 @@ class _Continuation(Stepper[P]):
         found += self._flat(point, t)
         if not found:
             return None
-        _, at, stop = min(found, key=lambda e: e[0])
-        return at, stop
+        s, at, stop = min(found, key=lambda e: e[0])
+        doubted = stop is not None and any(other is None for _, _, other in found)
+        return at, None if doubted and not self._is_first(point, s) else stop
+
+    def _is_first(self, point: P, s: float) -> bool:
+        """Whether nothing seems to happen before a part of the way to a point."""
+        del point
+        return s < 0.5
 
     def _flat(self, point: P, t: Array) -> list[tuple[float, P, Stop | None]]:
         """Return where curvatures vanish on the way to a point.
@@ -318,6 +324,14 @@ class _ArcContinuation(_Continuation[FritzJohn]):
             return 0.5, point, None
         exact = abs(at.left).max() <= self.system.tolerances.zero
         return s, at if exact else self.point, Stop.FLAT
+
+    def _is_first(self, point: FritzJohn, s: float) -> bool:
+        if self.chord(point) <= self.system.tolerances.beside:
+            return True
+        before = self._between(point, 0.999 * s)
+        steady = self._is_steady(point, (s / 2, 7 * s / 8), before.index)
+        alike = self.system.is_sparse or self._same_directions(before)
+        return steady and before.index == self.point.index and alike
 
     def _is_steady(self, point: FritzJohn, parts: Iterable[float], index: int) -> bool:
         """Whether the index is the given one at parts of the way to a point."""
