@@ -17,9 +17,9 @@ import pytest
 
 FILE = Path(__file__).parents[1] / "costs.json"
 LEAST = 0.05  # s, below which a test is not written
-QUICK = 0.1  # s, up to which `make test` runs a test
+QUICK = 0.08  # s, up to which `make test` runs a test
 CHEAP = 2.0  # s, up to which it runs the cheapest test of a file that has no quick one
-SLOW = 1.2  # s, from which only `make thorough` runs a test
+SLOW = 0.7  # s, from which only `make thorough` runs a test
 LONG = 5.0  # s, up to which `make wider` runs the cheapest test of a file all the same
 STARTS = ("subprocess.Popen", "os.fork", "os.posix_spawn")  # events of sys.audit
 
