@@ -21,6 +21,7 @@ from side_by_side import interleave, peak, print_table, ratio, write
 
 from polycorner.dumbbells import DumbbellDrum, DumbbellPair
 from polycorner.dumbbells.dynamics.starts import scatter
+from polycorner.motion.engine.arrays import PENETRATION
 from polycorner.motion.noise import Noise
 from polycorner.motion.simulation import start
 
@@ -140,7 +141,7 @@ def piles() -> dict[str, Any]:
             engine.advance(round(seconds / 1e-3))
             taken += time.process_time() - begun
             efforts.append(engine.effort)
-            overlap = max(overlap, float(engine.motion.sums[3]))
+            overlap = max(overlap, float(engine.motion.sums[PENETRATION]))
         missed = sum(e.unconverged for e in efforts) / sum(e.islands for e in efforts)
         figures[f"{count}, chatter {chatter}, {seconds:g} s"] = {
             "times real time": round(STARTS * seconds / taken, 2),

@@ -55,7 +55,7 @@ def linkage() -> Arrangement:
 def main() -> Result:
     a = linkage()
     drives = {
-        "motor": Prescribed("shaft", RATE * time_symbol(), limit=1000.0),
+        "motor": Prescribed("shaft", RATE * time_symbol()),
         "gas": Spring("cylinder", stiffness=5.0, length=ROD, damping=0.2),
     }
     system = a.system(drives=drives)
@@ -79,10 +79,9 @@ def draw(result: Result, path: Path) -> Path:
     above, below = figure.subplots(2, 1, sharex=True)
     above.plot(motion.times, result.piston, color="#0072B2")
     above.set(ylabel="piston (m)", title="a slider-crank at a turn a second")
-    work = motion.work["substrate"] - motion.dissipated["drives"]
     below.plot(motion.times, motion.kinetic, color="#E69F00", label="kinetic")
     below.plot(motion.times, motion.potential, color="#56B4E9", label="in the spring")
-    below.plot(motion.times, work, color="0.3", label="work of the motor")
+    below.plot(motion.times, motion.work["drive"], color="0.3", label="work of the motor")
     below.set(ylabel="energy (J)", xlabel="time (s)")
     below.legend(loc="upper left")
     return save(figure, path)

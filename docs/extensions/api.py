@@ -159,7 +159,7 @@ GROUPS = (
         "Velocities, times and contacts of bodies as symbols in formulas.",
         {
             "": "velocities",
-            "motion": "ContactFamily motions pair_coordinates pair_velocities time_symbol "
+            "motion": "ContactFamily Tie motions pair_coordinates pair_velocities time_symbol "
             "angular_velocity rotational_energy",
         },
     ),

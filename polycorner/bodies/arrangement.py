@@ -1,6 +1,6 @@
 """Arrangements: rigid bodies, what stands between them, and their placements without overlap."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 from itertools import chain
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.bodies.checking import angular, check_together, named
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.constraints import orients
-from polycorner.bodies.drives import Drive, driven, rate_of, split
+from polycorner.bodies.drives import Drive, counted_energy, driven, rate_of, split
 from polycorner.bodies.dynamics import (
     between,
     energies,
@@ -28,18 +29,28 @@ from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.masses import Mass
-from polycorner.bodies.mechanisms import Mechanism, check_joints, closed, completed, moved_along
+from polycorner.bodies.mechanisms import (
+    Mechanism,
+    check_joints,
+    closed,
+    completed,
+    followed,
+    moved_along,
+)
 from polycorner.bodies.neighbours import Pair, check_room, check_width, pairs
 from polycorner.bodies.pairs import Touch, Tree, apart, both_sharp, distances, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
 from polycorner.bodies.scenes import BodiesInSpace
-from polycorner.bodies.several import assembly, check_size
+from polycorner.bodies.several import assembly, check_size, tied
 from polycorner.bodies.shapes import Body
+from polycorner.bodies.ties import bouncing, met, owned
 from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.motion.assembly import Assembly
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.system import System
+from polycorner.motion.ties import Tie
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
@@ -52,51 +63,6 @@ if TYPE_CHECKING:
     import sympy
 
 ORIENTATIONS = ("needed", "all", "none")
-
-
-def named(given: Any) -> dict[str, Body]:
-    """Return bodies by name, numbered from 1 if they have none."""
-    if not isinstance(given, Mapping):
-        if isinstance(given, Body) or not isinstance(given, Sequence):
-            refuse("bodies", "several bodies, in a sequence or by name", given, TypeError)
-        given = {str(k): body for k, body in enumerate(given, 1)}
-    if not given:
-        refuse("bodies", "at least one body", given)
-    for name in given:
-        if not isinstance(name, str) or not f"x{name}".isidentifier():
-            refuse("bodies", "names of letters, digits and _, as coordinates have", name)
-    return dict(given)
-
-
-def check_together(
-    bodies: Mapping[str, Body],
-    fixed: Mapping[str, Body],
-    walls: Mapping[str, Wall],
-    joints: Iterable[str] = (),
-) -> None:
-    """Raise ValueError for a name of two things, or things in the plane and in space."""
-    known = [*bodies, *fixed, *walls, *joints]
-    twice = sorted({name for name in known if known.count(name) > 1})
-    if twice:
-        last = "joints" if twice[0] in joints else "walls" if twice[0] in walls else "fixed"
-        refuse(last, "names of their own", twice[0])
-    first, body = next(iter(bodies.items()))
-    space = "the plane" if body.dimension == 2 else "space"
-    for argument, several in (("bodies", bodies), ("fixed", fixed), ("walls", walls)):
-        for name, one in several.items():
-            if one.dimension != body.dimension:
-                refuse(argument, f"all in {space}, like {first!r}", name)
-
-
-def angular(argument: str, given: Any, d: int) -> float | Array:
-    """Return an angular velocity: one number in the plane, three in space, where 0 is none."""
-    expected = "an angular velocity, a finite number" if d == 2 else "3 finite numbers, or 0"
-    found = checks.numbers(argument, given, expected)
-    if d == 3 and found.ndim == 0 and found == 0:
-        return np.zeros(3)
-    if found.shape != (() if d == 2 else (3,)) or not np.isfinite(found).all():
-        refuse(argument, expected, given)
-    return float(found) if d == 2 else found.astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +239,12 @@ class Arrangement(Checked, Printed):
     @cached_property
     def manifold(self) -> Manifold:
         """The placements of all bodies; a unit displacement moves a body by :attr:`scale`."""
-        return reduce(mul, (placement.manifold for placement in self.placements))
+        every = [placement.manifold for placement in self.placements]
+        for joint, name in self.mechanism.counters.items():
+            ends = self.joints[joint].bodies
+            turn = min(p.manifold.scales[-1] for p in self.placements if p.name in ends)
+            every.append(Manifold((name,), scales=(turn,), units=("rad",)))
+        return reduce(mul, every)
 
     @cached_property
     def polyhedron(self) -> Polyhedron:
@@ -331,9 +302,10 @@ class Arrangement(Checked, Printed):
         restitution: Restitution = 0.0,
         exits: Mapping[str, float] | None = None,
         count: int | Mapping[str, int] = 1,
+        joints: Mapping[str, Any] | None = None,
         drives: Mapping[str, Drive] | None = None,
         forces: Mapping[str, Sequence[Any]] | None = None,
-    ) -> System | Any:
+    ) -> System | Assembly:
         """Return the mechanical system of the bodies.
 
         Several bodies are one dense system, with states ``(N,)``.  A single one may be repeated:
@@ -367,6 +339,10 @@ class Arrangement(Checked, Printed):
             As in :class:`~polycorner.System`.
         count : int, or mapping from str to int, optional
             Default 1; of several kinds for each body.
+        joints : mapping from str to Hinge, Slider, ..., optional
+            Joints between repeated bodies, or of one with space: the names of bodies are those in
+            messages, ``"small 3"``.  Those of the arrangement are here joints of each body of a
+            kind with space and fixed bodies, or of bodies of kinds with ``count`` 1.
         drives : mapping from str to Spring, Damper, Motor or Prescribed, optional
             By names of their own.
         forces : mapping from str to sequence of sympy.Expr or float, optional
@@ -403,23 +379,35 @@ class Arrangement(Checked, Printed):
         [[2.0, 0.0, -2.0]]
         """
         if isinstance(count, Mapping):
-            if self.joints or drives or forces:
-                refuse("count", "1 for bodies with joints, drives or forces of their own", count)
             check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
             alone = {p: self._alone(p) for p in self.placements}
             given = {"friction": friction, "rolling": rolling, "restitution": restitution}
-            some = {"masses": masses or {}, "exits": exits or {}}
-            return assembly(alone, count, given, some, gravity=gravity, density=density)
+            some = {"masses": masses, "exits": exits, "drives": drives, "forces": forces}
+            further = {name: one or {} for name, one in some.items()}
+            own = {name for one in alone.values() for name in one.joints}
+            held = {name: joint for name, joint in self.joints.items() if name not in own}
+            held |= self._further(joints)
+            return assembly(alone, count, given, further, held, gravity=gravity, density=density)
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1, or numbers by name, for several bodies", count)
         if len(self.placements) > 1:
             check_size(self.pairs, self.manifold.size)
+        held, ties = self._further(joints), list[Tie]()
+        friction, rubbing_ties = split(friction, held)
+        if count > 1:
+            alone = {self.placements[0]: self}
+            (drives,), ties = tied(
+                alone, {self.placements[0].name: count}, held, drives or {}, rubbing_ties
+            )
+        elif held:
+            refuse("joints", "those of the arrangement where count is 1", [*held])
         weights = masses_of(self.placements, density, {} if masses is None else masses)
         laws = energies(self.placements, weights, gravity, self.turning)
+        counting = counted_energy(self.mechanism, self.manifold, weights)
+        laws = laws[0] + counting, *laws[1:]
         friction, rubbing_joints = split(friction, self.joints)
-        holders = [WORLD, *self.fixed, *self.named]
-        of_joints = self.mechanism, self.manifold, holders
-        laws, moved = driven(*of_joints, laws, drives, forces, rubbing_joints)
+        of_joints = self.mechanism, self.manifold, [WORLD, *self.fixed, *self.named]
+        laws, moved, timed = driven(*of_joints, laws, drives, forces, rubbing_joints)
         touches: list[Touch] = []
         hulls: list[tuple[HullContacts, Pair]] = []
         for pair in self.pairs:
@@ -432,6 +420,7 @@ class Arrangement(Checked, Printed):
         meetings += [Meeting(t.gap.name, t.member.body, t.name) for t in self.at_walls]
         ends = {end: end.rpartition(".")[0] for end in self.mechanism.limits}
         meetings += [Meeting(end, joint, joint) for end, joint in ends.items()]
+        meetings += met(ties)
         family, first = None, self.placements[0]
         if count > 1:
             meetings.append(Meeting(f"{first.name}-{first.name}", first.name, first.name, True))
@@ -452,6 +441,7 @@ class Arrangement(Checked, Printed):
             between=family,
             exits={} if exits is None else exits,
             hulls=rubbing,
+            rheonomic=timed,
             scene=BodiesInSpace(
                 self.placements,
                 tuple(touches),
@@ -459,13 +449,23 @@ class Arrangement(Checked, Printed):
                 frozenset(self.walls),
                 count,
                 partial(touching_twins, (first, first), self.lattice),
-                {n: (a.body, b.body) for one, (a, b) in hulls for n in one.names},
+                tuple((one, (a.body, b.body)) for one, (a, b) in hulls),
             ),
+            ties=bouncing(ties, known.restitution),
         )
+
+    def _further(self, joints: Any) -> dict[str, AnyJoint]:
+        """Return joints of repeated bodies, after checking their names."""
+        found = {} if joints is None else dict(checks.mapping("joints", joints))
+        check_together(self.named, self.fixed, self.walls, [*self.joints, *found])
+        if found and self.lattice.axes:
+            refuse("joints", "none in a periodic box", [*found])
+        return found
 
     def _alone(self, p: Placement) -> "Arrangement":
         """Return the arrangement of one of the bodies, in the units of all."""
-        one = replace(self, bodies={p.name: p.body})
+        own = owned(self.joints, p.name, self.fixed)
+        one = replace(self, bodies={p.name: p.body}, joints=own)
         vars(one).update(scale=self.scale, placements=(replace(p, at=slice(0, p.manifold.size)),))
         return one
 
@@ -519,6 +519,8 @@ class Arrangement(Checked, Printed):
         given, values = ({} if known is None else known for known in (placed, joints))
         known = completed(self.mechanism, given, values, self.fixed)
         q = coordinates(known, self.placements)
+        if self.mechanism.counters:
+            q = self.mechanism.counted(self.manifold, q, followed(self.mechanism, values))
         return self.closed(q) if self.joints else q
 
     def closed(self, q: ArrayLike) -> Array:
@@ -570,6 +572,7 @@ class Arrangement(Checked, Printed):
         """
         point = self.manifold.point(q)
         found = rates(point, {} if moving is None else moving, self.placements)
+        found = self.mechanism.counted_rates(self.manifold, point, found)
         asked = checks.mapping("joints", {} if joints is None else joints)
         checks.names("joints", asked, self.joints)
         if not self.joints:

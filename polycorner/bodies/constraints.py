@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from polycorner.bodies.holds import Expressions
     from polycorner.spaces.distances import Point
 
-MOST_TEETH = 1000  # the largest denominator of the ratio of two gears that turn
-
 
 def check_fit(joint: Joint, d: int) -> None:
     """Raise ValueError for what does not fit in the plane, or in space."""
@@ -55,8 +53,12 @@ def check_fit(joint: Joint, d: int) -> None:
             refuse("axis", "no axis in the plane" if d == 2 else "3 numbers, not all zero", axis)
     elif axis is None and hasattr(joint, "axis"):
         refuse("axis", f"{d} numbers, the direction in the coordinates of the parent", None)
-    if isinstance(joint, Hinge) and limits is not None and not limits[1] - limits[0] < math.tau:
-        refuse("limits", "two angles less than a turn apart", limits)
+
+
+def counts_turns(joint: AnyJoint) -> bool:
+    """Whether limits of a joint tell turns apart, so that a coordinate has to count them."""
+    limits = joint.limits if isinstance(joint, Hinge) else None
+    return limits is not None and not limits[1] - limits[0] < math.tau
 
 
 def orients(joint: AnyJoint, name: str, body: Body) -> bool:
@@ -220,9 +222,9 @@ def geared(gear: Gear, first: Coordinate, second: Coordinate) -> "sympy.Expr":
         return second.plain - ratio * first.plain - phase
     teeth, of_first = (1 / ratio, 1.0) if isinstance(second, Position) else (1.0, ratio)
     if isinstance(first, Angle) and isinstance(second, Angle):
-        whole = Fraction(ratio).limit_denominator(MOST_TEETH)
+        whole = Fraction(ratio).limit_denominator(gear.teeth)
         if abs(float(whole) - ratio) > DEFAULT.rounding * abs(ratio):
-            refuse("ratio", f"a fraction with a denominator of at most {MOST_TEETH}", ratio)
+            refuse("ratio", f"a fraction with a denominator of at most {gear.teeth}", ratio)
         teeth, of_first = float(whole.denominator), float(whole.numerator)
     start = math.cos(teeth * phase / 2), -math.sin(teeth * phase / 2)
     _, sine = times(second.phase(teeth), times(first.phase(-of_first), start))

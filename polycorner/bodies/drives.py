@@ -1,5 +1,6 @@
 """Springs, dampers, motors, prescribed motions and forces: what drives bodies, as formulas."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.holds import hamilton, slopes_of
+from polycorner.bodies.holds import Angle, Coordinate, Position, hamilton, slopes_of
 from polycorner.bodies.laws import Coefficient, static_and_dynamic
+from polycorner.bodies.masses import Mass
 from polycorner.bodies.mechanisms import Mechanism
 from polycorner.bodies.poses import Placement
 from polycorner.checks import about, refuse
@@ -143,29 +145,35 @@ class Motor(Checked):
 class Prescribed(Checked):
     """A given motion of a joint, or of a coordinate of a body, as a function of the time.
 
-    A drive keeps the rate of the motion as long as it needs less than its ``limit``, so that the
-    motion is followed to second order in the step from where it starts.  What needs more stops it,
-    and it goes on from there.
+    Without a ``limit`` it is an equation with the time, which holds at the midpoints of steps, by a
+    force as large as it takes (``rheonomic`` of :class:`~polycorner.System`).  A state has to be on
+    it and to move along.  Angles count modulo a turn.
+
+    With a limit a drive keeps the rate of the motion as long as it needs less, so that the motion
+    is followed to second order in the step from where it starts, which may be anywhere.  What needs
+    more stops it, and it goes on from there.
 
     Parameters
     ----------
     of : str
         Name of a joint with an angle or a position, or of a coordinate.
     motion : sympy.Expr
-        A function of :func:`~polycorner.motion.time_symbol`.  Only its derivative counts.
-    limit : float
-        The largest force or torque of the drive.
+        A function of :func:`~polycorner.motion.time_symbol`.  With a limit only its derivative
+        counts.
+    limit : float, optional
+        The largest force or torque of the drive; default none.
     """
 
     of: str
     motion: "sympy.Expr"
     _: KW_ONLY
-    limit: float
+    limit: float | None = None
 
     def __post_init__(self) -> None:
         checks.instance("of", self.of, str)
         object.__setattr__(self, "motion", as_expression("motion", self.motion))
-        object.__setattr__(self, "limit", checks.real("limit", self.limit, above=0))
+        if self.limit is not None:
+            object.__setattr__(self, "limit", checks.real("limit", self.limit, above=0))
         super().__post_init__()
 
 
@@ -174,7 +182,7 @@ Drive = Damper | Motor | Prescribed
 
 @dataclass(eq=False)
 class Driven:
-    """What drives bodies: generalised forces and friction, which are added one after another.
+    """What drives bodies: forces, friction and equations, which are added one after another.
 
     Attributes
     ----------
@@ -184,6 +192,8 @@ class Driven:
         Names of what springs may hold.
     forces : dict from str to sympy.Expr
     friction : list of Friction
+    equations : dict from str to sympy.Expr
+        Those with the time.
     """
 
     mechanism: Mechanism
@@ -191,6 +201,7 @@ class Driven:
     known: tuple[str, ...]
     forces: "Expressions"
     friction: list[Friction]
+    equations: "Expressions"
 
     def add(self, forces: "Expressions", factor: Any = 1) -> None:
         """Add generalised forces by coordinate."""
@@ -258,19 +269,27 @@ class Driven:
         self._follow(name, slopes, drive.speed, drive.limit)
 
     def prescribed(self, name: str, drive: Prescribed) -> None:
-        """Add a drive that keeps the rate of a motion."""
+        """Add an equation with the time, or with a limit a drive that keeps the rate."""
         import sympy
 
         symbols = {s.name: s for s in self.manifold.symbols}
         hidden = {n for f in self.manifold.factors for n in f.names}
         plain = [n for n in symbols if n not in hidden]
         checks.names("of", [drive.of], [*self.mechanism.joints, *plain])
+        one: Coordinate
         if drive.of in self.mechanism.joints:
-            slopes = self.mechanism.coordinate(drive.of, "of").slopes(self.manifold.symbols)
+            one, turn = self.mechanism.coordinate(drive.of, "of"), 1.0
         else:
-            slopes = {drive.of: sympy.S.One}
+            x, period = symbols[drive.of], self.manifold.periods[[*symbols].index(drive.of)]
+            turn = math.tau / period if math.isfinite(period) else 1.0
+            round_ = Angle(sympy.cos(turn * x / 2), sympy.sin(turn * x / 2), x)
+            one = round_ if math.isfinite(period) else Position(x)
         now = time_symbol()
         _check_symbols("motion", drive.motion, {now})
+        if drive.limit is None:
+            self.equations[name] = one.away(turn * drive.motion) / turn
+            return
+        slopes = one.slopes(self.manifold.symbols)
         self._follow(name, slopes, sympy.diff(drive.motion, now), drive.limit)
 
     def _follow(self, name: str, slopes: "Expressions", pace: Any, limit: Any) -> None:
@@ -360,6 +379,28 @@ def rate_of(manifold: Manifold, slopes: "Expressions") -> "sympy.Expr":
     return sum(slope * rates[name] for name, slope in slopes.items())
 
 
+def counted_energy(
+    mechanism: Mechanism, manifold: Manifold, masses: Mapping[str, Mass]
+) -> "sympy.Expr":
+    """Return what coordinates that count turns add to the kinetic energy: nothing where they do.
+
+    A coordinate ``p`` that equals the angle ``a`` of a hinge gets a share ``e`` of inertia of the
+    bodies, ``e (p'^2 - a'^2) / 2``.  Without it the mass matrix would be singular.  It remains
+    positive definite for ``e < 1 / sum 1/I``, as ``a'^2 <= (sum 1/I) 2 T`` with the least moments
+    of inertia ``I`` of the bodies about their centres of mass.
+    """
+    import sympy
+
+    found, rates = sympy.S.Zero, dict(zip(manifold.names, velocities(manifold), strict=True))
+    for name, counter in mechanism.counters.items():
+        ends = [masses[body] for body in mechanism.joints[name].bodies if body in masses]
+        least = [float(np.linalg.eigvalsh(np.atleast_2d(mass.inertia))[0]) for mass in ends]
+        slopes = mechanism.angle(name).slopes(manifold.symbols)
+        share = 0.5 / sum(1 / inertia for inertia in least)
+        found += share * (rates[counter] ** 2 - rate_of(manifold, slopes) ** 2) / 2
+    return found
+
+
 def driven(
     mechanism: Mechanism,
     manifold: Manifold,
@@ -368,8 +409,10 @@ def driven(
     drives: Any,
     pushes: Any,
     rubbing: Mapping[str, Coefficient],
-) -> "tuple[tuple[sympy.Expr, sympy.Expr, dict[str, sympy.Expr]], tuple[Friction, ...]]":
-    """Return laws with those of drives, forces on bodies and friction in joints, and the friction.
+) -> "tuple[tuple[sympy.Expr, sympy.Expr, Expressions], tuple[Friction, ...], Expressions]":
+    """Return laws with those of drives and of forces on bodies, friction, and equations with time.
+
+    The friction is that in joints and of drives with a limit.
 
     Parameters
     ----------
@@ -387,7 +430,7 @@ def driven(
     drives = {} if drives is None else checks.mapping("drives", drives)
     pushes = {} if pushes is None else checks.mapping("forces", pushes)
     checks.names("forces", pushes, [p.name for p in mechanism.placements])
-    found = Driven(mechanism, manifold, tuple(known), dict(forces), [])
+    found = Driven(mechanism, manifold, tuple(known), dict(forces), [], {})
     for name, bounds in rubbing.items():
         found.rub(name, bounds)
     for name, given in pushes.items():
@@ -403,7 +446,7 @@ def driven(
                 potential = potential + found.spring(drive)
             else:
                 refuse("drive", "a Spring, Damper, Motor or Prescribed", drive, TypeError)
-    return (kinetic, potential, found.forces), tuple(found.friction)
+    return (kinetic, potential, found.forces), tuple(found.friction), found.equations
 
 
 def split(given: Any, names: Iterable[str]) -> tuple[Any, dict[str, Any]]:

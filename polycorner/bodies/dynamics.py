@@ -259,7 +259,7 @@ def twins(
 ) -> tuple[tuple[Placement, Placement], list[Pair]]:
     """Return two bodies like given ones, called after these with 1 and 2, and parts that meet."""
     one, two = (
-        replace(p, name=f"{p.name}{k}", manifold=_renamed(p, f"{p.name}{k}"))
+        replace(p, name=f"{p.name}{k}", manifold=renamed(p, f"{p.name}{k}"))
         for p, k in zip(placements, PAIR, strict=True)
     )
     return (one, two), pairs(lattice, (one, two), {})
@@ -267,12 +267,31 @@ def twins(
 
 def touching_twins(
     placements: tuple[Placement, Placement], lattice: Lattice
-) -> tuple[tuple[Placement, Placement], list[Touch]]:
-    """Return these and their contacts, without those of polyhedra, which have no formulas."""
+) -> tuple[tuple[Placement, Placement], list[Touch], HullContacts | None]:
+    """Return these and their contacts, those of sharp parts apart."""
     pair, meeting = twins(placements, lattice)
-    space, planar = pair[0].manifold * pair[1].manifold, pair[0].body.dimension == 2
-    smooth = (parts for parts in meeting if planar or not both_sharp(*parts))
-    return pair, [t for parts in smooth for t in distances(space, *parts)]
+    space = pair[0].manifold * pair[1].manifold
+    smooth = (parts for parts in meeting if not both_sharp(*parts))
+    touches = [t for parts in smooth for t in distances(space, *parts)]
+    return pair, touches, _twin_hulls(pair, meeting, lattice)
+
+
+def _twin_hulls(
+    pair: tuple[Placement, Placement], meeting: list[Pair], lattice: Lattice
+) -> HullContacts | None:
+    """Return the contacts of the sharp parts of two bodies, of the second the nearest image."""
+    sharp = [parts for parts in meeting if both_sharp(*parts)]
+    if not sharp:
+        return None
+    made = {m.name: _hull(m.name, m.part) for parts in sharp for m in parts}
+    scale = pair[0].manifold.scales[0]
+    return HullContacts(
+        [(made[one.name], made[two.name]) for one, two in sharp],
+        (pair[0].manifold.size, pair[1].manifold.size),
+        (OPTIONS.overlap * scale, OPTIONS.touching * scale),
+        (*pair[0].manifold.names, *pair[1].manifold.names),
+        lattice.lengths.tolist(),
+    )
 
 
 def between(
@@ -316,21 +335,17 @@ def between(
             restitution=restitution,
             definitions=definitions,
         )
-    if family is not None and not sharp:
+    hulls = _twin_hulls(pair, meeting, lattice)
+    if hulls is None:
+        assert family is not None, name
         return family
-    hulls = {m.name: m for parts in sharp for m in parts}
-    made = {name: _hull(name, member.part) for name, member in hulls.items()}
-    return HullContacts(
-        [(made[one.name], made[two.name]) for one, two in sharp],
-        (pair[0].manifold.size, pair[1].manifold.size),
-        (OPTIONS.overlap * scale, OPTIONS.touching * scale),
-        (*pair[0].manifold.names, *pair[1].manifold.names),
-        lattice.lengths.tolist(),
-        reach,
-        position,
-        tuple(PairLaw(law.static.dimension, law.static, law.moving, law.kind) for law in laws),
-        restitution,
-        family,
+    return replace(
+        hulls,
+        reach=reach,
+        position=position,
+        laws=tuple(PairLaw(f.static.dimension, f.static, f.moving, f.kind) for f in laws),
+        restitution=restitution,
+        further=family,
     )
 
 
@@ -385,7 +400,7 @@ def _hull(label: str, part: Part) -> Hull:
     return Hull(label, part.points, facets.normals, on, facets.edges)
 
 
-def _renamed(p: Placement, name: str) -> Manifold:
+def renamed(p: Placement, name: str) -> Manifold:
     """Return the manifold of a body of another name."""
     named = p.frame.manifold(name, p.body.dimension, 1.0, 1.0, "")
     return replace(named, scales=p.manifold.scales, units=p.manifold.units)

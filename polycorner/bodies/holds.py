@@ -92,6 +92,12 @@ class Angle(NamedTuple):
             change[name] = 2 * (self.cosine * s - self.sine * c)
         return change
 
+    def away(self, aim: Any) -> "sympy.Expr":
+        """Return what vanishes with the slope 1 at an angle, however often it goes round."""
+        import sympy
+
+        return 2 * (self.sine * sympy.cos(aim / 2) - self.cosine * sympy.sin(aim / 2))
+
     def phase(self, multiple: float) -> "tuple[sympy.Expr, sympy.Expr]":
         """Return cosine and sine of half a whole multiple."""
         import sympy
@@ -117,6 +123,10 @@ class Position(NamedTuple):
     def slopes(self, coordinates: "Sequence[sympy.Symbol]") -> "Expressions":
         """Return the derivatives by coordinates."""
         return slopes_of(self.plain, coordinates)
+
+    def away(self, aim: Any) -> "sympy.Expr":
+        """Return what vanishes with the slope 1 at a position."""
+        return self.plain - aim
 
     def phase(self, multiple: float) -> "tuple[sympy.Expr, sympy.Expr]":
         """Return cosine and sine of half a multiple."""

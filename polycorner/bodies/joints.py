@@ -99,8 +99,9 @@ class Hinge(_Limited):
     turn : float or scipy.spatial.transform.Rotation, optional
         The rotation of the child in the parent at the angle 0; default none.
     limits : (float, float), optional
-        Of the angle, less than a turn apart: the inequalities ``<name>.min`` and ``<name>.max``,
-        equal to the angle from the limit to the first order.
+        Of the angle: the inequalities ``<name>.min`` and ``<name>.max``, if they are less than a
+        turn apart equal to the angle from the limit to the first order.  Else turns are counted, by
+        a coordinate of the arrangement that follows the angle (the equation ``<name>.turns``).
     collide : bool, optional
         Whether the two may touch each other as well; default False.
 
@@ -243,15 +244,18 @@ class Gear(Checked):
         Names of two hinges, sliders or straight rails.
     ratio : float
         Not zero; negative for wheels that roll on each other.  Of two hinges a fraction with a
-        denominator of at most 1000, in lowest terms.
+        denominator of at most ``teeth``, in lowest terms.
     phase : float, optional
         Of the second one where the first one is zero; default 0.
+    teeth : int, optional
+        The largest denominator of the ratio of two hinges; default 1000.
     """
 
     first: str
     second: str
     ratio: float
     phase: float = 0.0
+    teeth: int = 1000
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -262,6 +266,7 @@ class Gear(Checked):
             refuse("ratio", "a number that is not zero", self.ratio)
         object.__setattr__(self, "ratio", ratio)
         object.__setattr__(self, "phase", checks.real("phase", self.phase))
+        checks.whole("teeth", self.teeth, least=1)
         super().__post_init__()
 
     @property

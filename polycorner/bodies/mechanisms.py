@@ -10,9 +10,16 @@ from scipy.spatial.transform import Rotation
 
 from polycorner import checks
 from polycorner.bodies import constraints
-from polycorner.bodies.constraints import check_fit, geared, has_coordinate, inequalities, relative
-from polycorner.bodies.frames import Frame
-from polycorner.bodies.holds import Coordinate, Holding
+from polycorner.bodies.constraints import (
+    check_fit,
+    counts_turns,
+    geared,
+    has_coordinate,
+    inequalities,
+    relative,
+)
+from polycorner.bodies.frames import Frame, symbols
+from polycorner.bodies.holds import Angle, Coordinate, Holding, Position
 from polycorner.bodies.joints import WORLD, AnyJoint, Gear, Hinge, Joint
 from polycorner.bodies.poses import Placement, pose_of
 from polycorner.bodies.shapes import Body
@@ -82,7 +89,42 @@ class Mechanism(Checked):
         if not (isinstance(joint, Joint) and has_coordinate(joint)):
             able = "a hinge, a slider or a straight rail, which have one coordinate"
             refuse(argument, able, name)
+        if name in self.counters:
+            return Position(*symbols([self.counters[name]]))
         return constraints.coordinate(joint, *self.sides(joint))
+
+    @property
+    def counters(self) -> dict[str, str]:
+        """The coordinates that count the turns of hinges, by the names of these."""
+        counted = [name for name, joint in self.joints.items() if counts_turns(joint)]
+        return {name: f"turned{k}" for k, name in enumerate(counted, 1)}
+
+    def angle(self, name: str) -> Angle:
+        """Return the angle of a hinge whose turns are counted, by the bodies alone."""
+        joint = self.joints[name]
+        assert isinstance(joint, Hinge), name
+        found = constraints.coordinate(joint, *self.sides(joint))
+        assert isinstance(found, Angle), name
+        return found
+
+    def counted(self, manifold: Manifold, q: Array, values: Mapping[str, Any]) -> Array:
+        """Return the angles of counted hinges nearest to given values; else within half a turn."""
+        names, found = manifold.names[: len(q)], []
+        for name in self.counters:
+            family = Family.of({name: self.angle(name).value()}, names)
+            angle = float(family.evaluate(q)[0][0])
+            turns = (checks.real("joints", values.get(name, angle)) - angle) / math.tau
+            found.append(angle + math.tau * round(turns))
+        return np.append(q, found)
+
+    def counted_rates(self, manifold: Manifold, q: Array, v: Array) -> Array:
+        """Return velocities of bodies, then the rates of counted hinges."""
+        at, found = dict(zip(manifold.symbols, q.tolist(), strict=True)), []
+        rates = dict(zip(manifold.names, v.tolist(), strict=False))
+        for name in self.counters:
+            slopes = self.angle(name).slopes(manifold.symbols)
+            found.append(sum(float(s.subs(at)) * rates[x] for x, s in slopes.items()))
+        return np.append(v, found)
 
     @property
     def equations(self) -> "Expressions":
@@ -96,6 +138,9 @@ class Mechanism(Checked):
                 continue
             some = constraints.equations(joint, *self.sides(joint))
             found |= {f"{name}.{end}": e for end, e in some.items()}
+            if name in self.counters:
+                (turned,) = symbols([self.counters[name]])
+                found[f"{name}.turns"] = self.angle(name).away(turned)
         return found
 
     @property

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies import link_laws
-from polycorner.bodies.arrangement import check_together
 from polycorner.bodies.chains import (
     Moving,
     Pose,
@@ -22,6 +21,7 @@ from polycorner.bodies.chains import (
     moved,
     still,
 )
+from polycorner.bodies.checking import check_together
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
 from polycorner.bodies.link_parts import CarriedPart, affine, carried_parts, gaps_of, touch
@@ -309,15 +309,8 @@ class Robot(Checked):
                 f"{gaps_of(one.part, two.part)}; capsules have one each"
             )
             raise ValueError(msg)
-        found: list[Tree] = [
-            apart(
-                self.manifold,
-                self._linked(one, two.carrier),
-                self._linked(two, None),
-                excluded=excluded,
-            )
-            for one, two in pairs
-        ]
+        placed = ((self._linked(a, b.carrier), self._linked(b, None)) for a, b in pairs)
+        found = [apart(self.manifold, *two, excluded=excluded) for two in placed]
         found += [met.gap for _, met in self._at_walls]
         found = [*together(found), *self._limits]
         if not found:
@@ -336,13 +329,9 @@ class Robot(Checked):
         for one, two in combinations(self._carried, 2):
             if one.carrier == two.carrier or frozenset((one.link, two.link)) in ignored:
                 continue
-            before = {c: self._tree.steps[c][0] if c else None for c in (one.carrier, two.carrier)}
-            if (
-                one.is_linked
-                and two.is_linked
-                and (before[one.carrier] == two.carrier or before[two.carrier] == one.carrier)
-            ):
-                continue
+            a, b = (self._tree.steps[c][0] if c else None for c in (one.carrier, two.carrier))
+            if one.is_linked and two.is_linked and (a == two.carrier or b == one.carrier):
+                continue  # links that a joint connects
             yield (one, two) if one.carrier else (two, one)  # what stands in space is the second
 
     @cached_property
@@ -379,13 +368,18 @@ class Robot(Checked):
 
     @checked
     def overlapping(self, q: ArrayLike) -> list[tuple[str, str]]:
-        """Return the pairs of links, free and fixed bodies that overlap or touch at a point."""
-        poses = self._poses(q)
+        """Return the pairs of links, free and fixed bodies that overlap or touch at a point.
+
+        After these the links and free bodies that are beyond walls, with them: what stands on a
+        wall is where it is meant to be.
+        """
+        poses, point = self._poses(q), self.manifold.point(q)
         found = [
             (one.link, two.link)
             for one, two in self._pairs()
             if touch(*(x.part.moved(*poses[x.carrier][::-1]) for x in (one, two)))
         ]
+        found += [(one.link, met.name) for one, met in self._at_walls if met.gap.value(point) < 0]
         return [*dict.fromkeys(found)]
 
     # ------------------------------------------------------------------------------------ motion

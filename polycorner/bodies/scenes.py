@@ -6,7 +6,7 @@ have to agree with.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,10 +16,13 @@ from polycorner.bodies.shapes import Facets
 from polycorner.bodies.slips import rolling_arm
 from polycorner.bodies.walls import HalfSpace, Wall, WallTouch
 from polycorner.bodies.waves import waves
+from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.scenes import Scene, Site
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import cached_property
+
+Twins = tuple[Sequence[Placement], Sequence[Touch], HullContacts | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +40,8 @@ class BodiesInSpace(Scene):
         How often the only body is repeated.
     twins : function
         Returns the placements of two bodies like it and their contacts.
-    further : mapping from str to (str, str)
-        The bodies at contacts of which no more is known.
+    hulls : sequence of (HullContacts, (str, str))
+        Contacts of sharp bodies, and the names of the two.
     """
 
     placements: tuple[Placement, ...]
@@ -46,8 +49,8 @@ class BodiesInSpace(Scene):
     at_walls: tuple[WallTouch, ...]
     walls: frozenset[str]
     count: int
-    twins: Callable[[], tuple[Sequence[Placement], Sequence[Touch]]]
-    further: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    twins: Callable[[], Twins]
+    hulls: Sequence[tuple[HullContacts, tuple[str, str]]] = ()
 
     @cached_property
     def names(self) -> tuple[str, ...]:  # type: ignore[override] # it is not written
@@ -66,7 +69,7 @@ class BodiesInSpace(Scene):
             t.gap.name: (t, own) for t in self.touches
         }
         if self.count > 1:
-            (one, two), touches = self.twins()
+            (one, two), touches, _ = self.twins()
             n = one.manifold.size
             pair = {one.name: one, two.name: replace(two, at=slice(n, 2 * n))}
             found |= {t.gap.name: (t, pair) for t in touches}
@@ -86,7 +89,19 @@ class BodiesInSpace(Scene):
             return self._called(t.one, bodies), self._called(t.two, bodies)
         if len(bodies) == 2:
             return self.names[bodies[0]], self.names[bodies[1]]
-        return self.further.get(contact, ())
+        if contact not in self._of_hulls:
+            return ()
+        names = self._of_hulls[contact][1]
+        moving = {p.name for p in self.placements} if self.count > 1 else {}
+        one, two = (self.names[bodies[0]] if name in moving else name for name in names)
+        return one, two
+
+    @cached_property
+    def _of_hulls(self) -> dict[str, tuple[HullContacts, tuple[str, str]]]:
+        """The contacts of sharp bodies; of repeated ones among each other as well."""
+        more = self.twins()[2] if self.count > 1 else None
+        every = [*self.hulls, *([] if more is None else [(more, ("", ""))])]
+        return {name: one for one in every for name in one[0].names}
 
     def _called(self, m: PlacedPart, bodies: tuple[int, ...]) -> str:
         """Return the name of a body, where it is repeated that of one of those at the contact."""
@@ -107,7 +122,7 @@ class BodiesInSpace(Scene):
             normal, radius = _inward(wall, p), member.part.radius
             return Site(a, b, p - radius * normal, normal, radius)
         if contact not in self._between:
-            return None
+            return self._at_hulls(names, contact, own)
         touch, placements = self._between[contact]
         one, two = touch.one, touch.two
         first = _placed(one, touch.first, placements, own)
@@ -116,6 +131,20 @@ class BodiesInSpace(Scene):
         facets = _turned(two, placements, own) if len(second) > 2 else None
         p, normal = _nearest(first, second + away, facets)
         return Site(a, b, p - one.part.radius * normal, normal, rolling_arm(one.part, two.part))
+
+    def _at_hulls(self, names: tuple[str, ...], contact: str, own: Array) -> Site | None:
+        if contact not in self._of_hulls:
+            return None
+        hulls, (one, two) = self._of_hulls[contact][0], names
+        known = [name for p in self.placements for name in p.manifold.names]
+        if {*hulls.reads} <= {*known}:  # else those of two bodies that are alike
+            own = own[[known.index(name) for name in hulls.reads]]
+        point, normal = hulls.site(contact, own)
+        # Friction is along the tangents of the normal to the second, which in space are not minus
+        # those of its opposite: there the second comes first.
+        if len(normal) == 2:
+            return Site(one, two, point, -normal, 0.0)
+        return Site(two, one, point, normal, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +162,7 @@ class KindsInSpace(Scene):
 
     alone: Mapping[str, BodiesInSpace]
     count: Mapping[str, int]
-    twins: Callable[[str, str], tuple[Sequence[Placement], Sequence[Touch]]]
+    twins: Callable[[str, str], Twins]
 
     @cached_property
     def names(self) -> tuple[str, ...]:  # type: ignore[override] # it is not written
@@ -156,10 +185,11 @@ class KindsInSpace(Scene):
     def _pair(self, one: str, two: str) -> BodiesInSpace:
         """Return two bodies of given kinds by themselves."""
         if (one, two) not in self._met:
-            (p, q), touches = self.twins(one, two)
-            n = p.manifold.size
+            (p, q), touches, hulls = self.twins(one, two)
+            n, listed = p.manifold.size, () if hulls is None else ((hulls, (p.name, q.name)),)
             placed = (replace(p, at=slice(n)), replace(q, at=slice(n, n + q.manifold.size)))
-            pair = BodiesInSpace(placed, tuple(touches), (), frozenset(), 1, self.twins)  # type: ignore[arg-type] # not repeated
+            # It is not repeated.
+            pair = BodiesInSpace(placed, tuple(touches), (), frozenset(), 1, self.twins, listed)  # type: ignore[arg-type]
             self._met[one, two] = pair
         return self._met[one, two]
 
@@ -169,9 +199,13 @@ class KindsInSpace(Scene):
 
     def parties(self, bodies: tuple[int, ...], contact: str) -> tuple[str, ...]:
         """Return the names of the two that touch at a contact of bodies; empty if not known."""
-        scene = self._alone(bodies)
-        called = dict(zip(scene.names, (self.names[i] for i in bodies), strict=True))
-        return tuple(called.get(name, name) for name in scene.parties((0,), contact))
+        called = self._called(bodies)
+        return tuple(called.get(n, n) for n in self._alone(bodies).parties((0,), contact))
+
+    def _called(self, bodies: tuple[int, ...]) -> dict[str, str]:
+        """Return what bodies by themselves are called among all."""
+        ours = (self.names[i] for i in bodies)
+        return dict(zip(self._alone(bodies).names, ours, strict=True))
 
     def site(self, bodies: tuple[int, ...], contact: str, q: Array) -> Site | None:
         """Return where a contact of bodies is; None if it is not known."""
@@ -181,7 +215,8 @@ class KindsInSpace(Scene):
         found = scene.site((0,), contact, own[None])
         if found is None:
             return None
-        one, two = self.parties(bodies, contact)
+        called = self._called(bodies)
+        one, two = (called.get(name, name) for name in (found.one, found.two))
         return found._replace(one=one, two=two)
 
 

@@ -35,6 +35,7 @@ from polycorner.motion.contacts import ContactFamily
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.system import System
 from polycorner.motion.tables import read_touches
+from polycorner.motion.ties import described_tie
 from polycorner.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -258,11 +259,15 @@ def _attributes(trajectory: Trajectory, system: System | Assembly) -> dict[str, 
 
 def _told(system: System | Assembly) -> dict[str, Any]:
     """Return a system as plain values, formulas as text."""
+    told: dict[str, Any] = {}
+    if system.ties:
+        told["ties"] = [described_tie(tie, formula_text) for tie in system.ties]
     if isinstance(system, System):
-        return _body(system) | {"count": system.count, "between": _between(system.between)}
+        own = {"count": system.count, "between": _between(system.between)}
+        return _body(system) | own | told
     bodies = {f"kind {name}": _body(kind) for name, kind in system.kinds.items()}
     pairs = {f"between {a} and {b}": _between(f) for (a, b), f in system.between.items()}
-    return bodies | pairs | {"count": dict(system.count)}
+    return bodies | pairs | {"count": dict(system.count)} | told
 
 
 def _body(system: System) -> dict[str, Any]:

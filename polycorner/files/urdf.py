@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from polycorner import checks
+from polycorner.bodies.holds import across
 from polycorner.bodies.links import KINDS, RobotJoint, RobotLink
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.robots import Robot
@@ -58,6 +59,7 @@ NEEDED = {
     "collision": ("geometry",),
     "inertial": ("mass", "inertia"),
 }
+LOOSE = ("planar", "floating")  # joints with several coordinates
 KEPT = {
     "robot": ("link", "joint"),
     "link": ("inertial", "collision"),
@@ -86,7 +88,9 @@ def read_urdf(
     ``shapes`` says.  Visual shapes, transmissions and plugins are left out.  Links that overlap
     with all joints at zero, or at the limit next to it, are taken not to touch: they are
     ``Robot.ignored``.  Limits without numbers are none, as simulators take them.
-    Names become those of Python, with ``_`` for other characters.
+    Names become those of Python, with ``_`` for other characters.  A planar joint ``J`` has the
+    coordinates ``J_x``, ``J_y`` across its axis and ``J`` about it; one that floats leads from an
+    empty link to the base, which floats.
 
     Parameters
     ----------
@@ -120,7 +124,7 @@ def read_urdf(
     ------
     ValueError
         With file, line and element for what is not understood: other XML, document types, xacro,
-        joints that float or move in a plane, numbers that are none, inertias that no body has,
+        joints that float within a chain, numbers that are none, inertias that no body has,
         meshes that are not in the folder.
     ImportError
         Naming the extra that reads URDF.
@@ -178,10 +182,52 @@ def read_urdf(
         names |= _identifiers(about, [x.name for x in several])
     with checks.about(about):
         links = {names[x.name]: _link(shaper, x) for x in found.links}
-        joints = {names[x.name]: _joint(x, names) for x in found.joints}
-        robot = Robot(links, joints, base=base)
+        joints: dict[str, RobotJoint] = {}
+        tied: list[tuple[str, str]] = []
+        for x in found.joints:
+            if x.type == "floating":
+                _check_floating(x, found, links[names[x.parent]])
+                del links[names[x.parent]]
+                base = "floating"
+                continue
+            name, joint = names[x.name], _joint(x, names)
+            if x.type == "planar":
+                more, several = _planar(name, joint)
+                if taken := {*more, *several} & {*links, *joints, *names.values()} - {name}:
+                    refuse("joints", f"no other link or joint {min(taken)!r}", x.name)
+                links, joints = links | more, joints | several
+                tied.append((joint.parent, joint.child))
+            else:
+                joints[name] = joint
+        robot = Robot(links, joints, base=base, ignored=tied)
         moves = base == "floating" or any(joint.moves for joint in joints.values())
-        return replace(robot, ignored=robot.overlapping(robot.home)) if moves else robot
+        if not moves:
+            return robot
+        return replace(robot, ignored=[*robot.ignored, *robot.overlapping(robot.home)])
+
+
+def _check_floating(joint: Any, robot: Any, parent: RobotLink) -> None:
+    """Raise unless a joint that floats leads from a link that is nothing but space to the rest."""
+    others = (j for j in robot.joints if j is not joint and joint.parent in {j.parent, j.child})
+    if any(others) or parent.body is not None or parent.mass is not None:
+        expected = f"a floating joint from an empty link, {joint.parent!r}, and no other of it"
+        refuse(f"joint {joint.name!r}", expected, "shapes, a mass or further joints")
+
+
+def _planar(name: str, joint: RobotJoint) -> tuple[dict[str, RobotLink], dict[str, RobotJoint]]:
+    """Return what a joint in a plane is made of: two that slide and one that turns about the axis.
+
+    The directions are those of :func:`~polycorner.bodies.holds.across`, for the axis ``z`` those of
+    ``x`` and ``y``.
+    """
+    first, second = f"{name}_1", f"{name}_2"
+    u, v = across(joint.axis)
+    there = replace(joint, parent=second, origin=np.zeros(3), turn=np.eye(3))
+    return {first: RobotLink(), second: RobotLink()}, {
+        f"{name}_x": replace(joint, child=first, kind="prismatic", axis=u),
+        f"{name}_y": replace(there, parent=first, child=second, kind="prismatic", axis=v),
+        name: there,
+    }
 
 
 def _parsed(about: str, data: bytes) -> Any:
@@ -253,8 +299,9 @@ def _check(about: str, element: Any) -> None:
 
 def _check_kind(place: str, joint: Any) -> None:
     kind = joint.get("type")
-    if kind not in KINDS:
-        refuse(place, f"the type {checks.listed(KINDS)}, of which chains are made", kind)
+    if kind not in (*KINDS, *LOOSE):
+        every = checks.listed((*KINDS, *LOOSE))
+        refuse(place, f"the type {every}, of which chains are made", kind)
     if kind in {"revolute", "prismatic"} and joint.find("limit") is None:
         refuse(place, "an element <limit>", [child.tag for child in joint])
 
@@ -328,7 +375,7 @@ def _joint(joint: Any, names: Mapping[str, str]) -> RobotJoint:
         return RobotJoint(
             names[joint.parent],
             names[joint.child],
-            joint.type,
+            "continuous" if joint.type == "planar" else joint.type,
             origin,
             matrix,
             np.array([0.0, 0.0, 1.0]) if joint.type == "fixed" else joint.axis,

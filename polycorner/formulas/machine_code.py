@@ -20,6 +20,9 @@ from polycorner.formulas.cache import read_code, source_key, write_code
 from polycorner.formulas.operations import OPERATIONS
 
 OPTIMISATION = 2
+# A pass that takes a sixth of the time that code of algorithms takes, or more, and makes it no
+# faster as far as can be measured: their loops go over many arrays, bounded by what is in memory.
+LEFT_OUT = "disable-lsr"
 
 
 def machine_key() -> str:
@@ -32,7 +35,8 @@ def machine_key() -> str:
 def machine_code(text: str, *, optimise: bool = True) -> bytes:
     """Return the machine code of intermediate code, as an object file.
 
-    Code that :func:`portable_code` returns need not be optimised again.
+    Code that :func:`portable_code` returns need not be optimised again; it is that of algorithms,
+    and long: a pass that hardly optimises it is left out.
 
     Raises
     ------
@@ -47,7 +51,14 @@ def machine_code(text: str, *, optimise: bool = True) -> bytes:
         options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION)
         options.loop_vectorization = True
         _run_passes(parsed, target, options)
-    code: bytes = target.emit_object(parsed)
+    if not optimise:
+        # Options of LLVM are those of the process: other code is made with all passes.
+        llvm.set_option("polycorner", f"-{LEFT_OUT}=true")
+    try:
+        code: bytes = target.emit_object(parsed)
+    finally:
+        if not optimise:
+            llvm.set_option("polycorner", f"-{LEFT_OUT}=false")
     return code
 
 

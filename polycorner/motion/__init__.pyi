@@ -20,6 +20,7 @@ from .rotations import angular_velocity, rotational_energy
 from .scenes import ContactForce, ContactForces
 from .simulation import simulate, step
 from .system import System
+from .ties import Tie
 from .trajectory import MotionOfKind, Trajectory, contact_forces
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "Solver",
     "State",
     "System",
+    "Tie",
     "Trajectory",
     "accelerations",
     "angular_velocity",

@@ -13,6 +13,7 @@ from polycorner.checks import instance, refuse
 from polycorner.motion.formulation import moment
 from polycorner.motion.mechanics import State
 from polycorner.motion.noise import OPTIONS
+from polycorner.motion.placements import gap_unit
 from polycorner.motion.system import System
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -108,6 +109,8 @@ def accelerations(system: System, state: State) -> Accelerations:
     if system.hulls:
         expected = "contacts that are formulas, none of two sharp hulls"
         refuse("system", expected, system.hulls[0].names[0], NotImplementedError)
+    if system.ties:
+        refuse("system", "one without ties", [tie.name for tie in system.ties])
     problem = _Problem.of(system, state)
     found: list[tuple[Array, Array]] = []
     several = False
@@ -182,12 +185,14 @@ class _Problem:
         law = system.formulation
         if law.is_paced:
             refuse("system", "slips that do not depend on the time", [*law.parameters])
+        if system.rheonomic:
+            refuse("system", "equations that do not depend on the time", [*system.rheonomic])
         now = moment(law, law.at(system.parameters, state.time), q, v)
         gaps, rows, hessians = system.polyhedron.bundle.evaluate(q, 2)
         rates = rows @ v
         sizes = np.linalg.norm(rows * scales, axis=-1)
         still = OPTIONS.overlap * sizes * np.linalg.norm(v / scales)
-        touching = np.flatnonzero(gaps[:m] <= OPTIONS.overlap * scales.min())
+        touching = np.flatnonzero(gaps[:m] <= OPTIONS.overlap * gap_unit(system.manifold))
         for g in touching:
             if rates[g] < -still[g]:
                 expected = f"a velocity at which contact {system.contacts[g]!r} does not close"

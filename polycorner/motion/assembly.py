@@ -15,9 +15,15 @@ from polycorner.motion.contacts import ContactFamily, periods_of, position_of
 from polycorner.motion.formulation import energies
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
-from polycorner.motion.placements import check_contacts, check_equations, check_velocities
-from polycorner.motion.scenes import Scene
-from polycorner.motion.system import System, leapfrog_limit, overlapping
+from polycorner.motion.placements import (
+    check_contacts,
+    check_equations,
+    check_ties,
+    check_velocities,
+)
+from polycorner.motion.scenes import Scene, overlapping
+from polycorner.motion.system import System, leapfrog_limit
+from polycorner.motion.ties import Tie, compiled_ties, described_tie
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
@@ -43,6 +49,8 @@ class Assembly(MechanicalSystem):
         with 1.  Bodies of pairs that are left out pass through each other.
     scene : Scene, optional
         Names of the bodies in space, and where they touch.
+    ties : sequence of Tie, optional
+        Joints, limits, springs and drives between two of the bodies, or of one and the world.
 
     Raises
     ------
@@ -80,6 +88,7 @@ class Assembly(MechanicalSystem):
     count: Mapping[str, int]
     between: Mapping[Pair, ContactFamily | HullContacts] = field(default_factory=dict)
     scene: Scene | None = None
+    ties: tuple[Tie, ...] = ()
 
     def __post_init__(self) -> None:
         kinds, count = mapping("kinds", self.kinds), mapping("count", self.count)
@@ -92,10 +101,15 @@ class Assembly(MechanicalSystem):
             whole(f"count of {name!r}", count[name], least=1)
             if instance("kinds", one, System).count != 1 or one.between is not None:
                 refuse("kinds", f"one body as {name!r}, counts and contacts apart", one.count)
+            if one.rheonomic:
+                refuse("kinds", f"no equations with the time for {name!r}", [*one.rheonomic])
             if {*one.substrate.values()} != {*next(iter(kinds.values())).substrate.values()}:
                 refuse("kinds", f"the same substrate for {name!r} as for others", one.substrate)
+            if self.ties and one.exits:
+                refuse("exits", "none in a system whose bodies have ties", dict(one.exits))
         object.__setattr__(self, "kinds", dict(kinds))
         object.__setattr__(self, "count", {name: int(count[name]) for name in kinds})
+        object.__setattr__(self, "ties", tuple(self.ties))
         self._order_pairs()
         _ = self.bodies
         super().__post_init__()
@@ -133,7 +147,9 @@ class Assembly(MechanicalSystem):
         if len(lengths) > 1:
             refuse("kinds", "positions that repeat after the same lengths", sorted(lengths))
         first = next(iter(own.values()))
-        return SeveralKinds(own, between, first.period, first.substrate_speed)
+        counted = [(self.kinds[name].manifold, n) for name, n in self.count.items()]
+        every = SeveralKinds(own, between, first.period, first.substrate_speed)
+        return replace(every, ties=compiled_ties(self.ties, counted, every.names))
 
     def _kind(self, name: str) -> IdenticalBodies:
         """Return the bodies of one kind, whose position is that of all pairs that it is in."""
@@ -213,7 +229,9 @@ class Assembly(MechanicalSystem):
         for name, kind in self.kinds.items():
             check_velocities(kind.polyhedron, each[name], moved[name], self._called(name))
             sticks.append(kind.sticks(each[name], moved[name]).ravel())
-        return State(real("time", time, unit="s"), places, speeds, np.concatenate(sticks))
+        time = real("time", time, unit="s")
+        check_ties(self.bodies, self.bodies.padded(places), self.bodies.padded(speeds), time)
+        return State(time, places, speeds, np.concatenate(sticks))
 
     @checked
     def check_placement(self, q: Array) -> None:
@@ -236,8 +254,8 @@ class Assembly(MechanicalSystem):
 
     @checked
     def energies(self, state: State) -> tuple[float, float]:
-        """Return kinetic and potential energy of all bodies."""
-        kinetic = potential = 0.0
+        """Return kinetic and potential energy of all bodies and ties."""
+        kinetic, potential = 0.0, self.bodies.ties.energy(self.bodies.padded(state.q))
         q, v = self.split(state.q), self.split(state.v)
         for name in self.kinds:
             kind = self.kinds[name]
@@ -250,7 +268,11 @@ class Assembly(MechanicalSystem):
     def largest_step(self, state: State) -> tuple[float, str]:
         """Return ``2 / omega`` with the highest frequency of small motions of any body."""
         q, v = self.split(state.q), self.split(state.v)
-        return min(leapfrog_limit(kind, q[name], v[name]) for name, kind in self.kinds.items())
+        return leapfrog_limit(
+            [(kind, q[name], v[name]) for name, kind in self.kinds.items()],
+            self.bodies.ties,
+            state.time,
+        )
 
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""
@@ -260,4 +282,6 @@ class Assembly(MechanicalSystem):
             told |= {f"{name}: {key}": value for key, value in known.items()}
         for (one, two), family in self.between.items():
             told |= {f"{one}-{two}: {key}": value for key, value in family.described().items()}
+        if self.ties:
+            told["ties"] = [described_tie(tie) for tie in self.ties]
         return told

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.families import Family
-from polycorner.motion.convex_sets import ConvexSet
+from polycorner.motion.convex_sets import ConvexSet, in_words
 from polycorner.motion.formulation import Formulation
 from polycorner.motion.noise import OPTIONS
 from polycorner.motion.scenes import Rubbing
+from polycorner.motion.tie_forms import NO_TIES, Ties
+from polycorner.printing import number
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value, cached_property
 
@@ -94,6 +96,15 @@ class MovingBody(Value):
     signal_parameters: Array = field(default_factory=lambda: np.empty(0))
     slow_signals: bool = False
 
+    @property
+    def timed(self) -> bool:
+        """Whether equations have the time, which their kernels read after all coordinates."""
+        return any(map(self.reads_time, self.gaps))
+
+    def reads_time(self, call: Call) -> bool:
+        """Whether a kernel of gaps does."""
+        return max(call.reads, default=-1) >= len(self.formulation.coordinates)
+
 
 @dataclass(frozen=True)
 class PairLaw(Value):
@@ -144,6 +155,12 @@ class PairContacts(Value):
     restitution: float
     reach: float
 
+    def rows(self) -> Iterator[tuple[str, str, str]]:
+        """Yield of each gap its name, friction and restitution in words."""
+        friction = in_words((law.cause, law.static, law.dynamic) for law in self.laws)
+        for name in self.gaps.names:
+            yield name, friction, number(self.restitution, 6)
+
 
 class MovingBodies(Value):
     """Bodies that may touch each other, numbered kind after kind; base of what the engine moves.
@@ -157,10 +174,13 @@ class MovingBodies(Value):
         After which each component of a position repeats, as a length; infinite if it does not.
     substrate_speed : float
         Speed of the substrate along the first of them, as a length per time.
+    ties : Ties
+        Ties of two bodies, or of one and the world.
     """
 
     period: tuple[float, ...]
     substrate_speed: float
+    ties: Ties
 
     @property
     def kinds(self) -> "tuple[IdenticalBodies, ...]":
@@ -235,6 +255,14 @@ class MovingBodies(Value):
         """Number of coordinates of the kind that has most of them, ``k``; others end with zeros."""
         return max(kind.dimension for kind in self.kinds)
 
+    @cached_property
+    def units(self) -> Array:
+        """Length that a unit of each coordinate stands for, ``(N, k)``; 1 where there is none."""
+        found = np.ones((self.total, self.width))
+        for kind, at in self.slices:
+            found[at, : kind.dimension] = kind.body.units
+        return found
+
     @property
     def frictions(self) -> int:
         """Number of the friction contacts of all bodies with their surroundings."""
@@ -250,14 +278,15 @@ class MovingBodies(Value):
         """Causes of dissipation."""
         causes = [c.cause for kind in self.kinds for c in kind.body.friction]
         causes += [law.cause for family in self.families.values() for law in family.laws]
+        causes += [friction.cause for friction in self.ties.friction]
         return tuple(dict.fromkeys([IMPACT, *causes]))
 
     @cached_property
     def contact_names(self) -> tuple[str, ...]:
-        """Names of all contacts: those of bodies with their surroundings, then those of pairs."""
+        """Names of all contacts: of bodies with their surroundings, of pairs, then of ties."""
         own = [name for kind in self.kinds for name in kind.body.contacts]
         pairs = [name for family in self.families.values() for name in family.gaps.names]
-        return tuple(dict.fromkeys(own + pairs))
+        return tuple(dict.fromkeys((*own, *pairs, *self.ties.names)))
 
     @property
     def formula_keys(self) -> list[str]:
@@ -271,6 +300,8 @@ class MovingBodies(Value):
             found += [f"{call.family.key} {call.parameters.tolist()}" for call in body.gaps]
         for contacts in self.families.values():
             found += [contacts.gaps.key, *(family.key for family, _, _ in contacts.slips)]
+        for form in self.ties.forms:
+            found += [f.identity for f in (form.rows, form.slips, form.forces) if f]
         return found
 
     @property
@@ -374,6 +405,7 @@ class MovingBodies(Value):
         ``beyond`` is a length, as the reach.
         """
         positions, starts = self.positions(q), self.starts
+        tied = {(min(pair), max(pair)) for pair in self.ties.apart}
         for (a, b), contacts in self.families.items():
             numbers = np.array([*contacts.parameters, 0.0])
             for i in range(starts[a], starts[a + 1]):
@@ -385,6 +417,8 @@ class MovingBodies(Value):
                         x -= period * np.floor(x / period + 0.5)
                 near = np.flatnonzero(np.linalg.norm(away, axis=1) < contacts.reach + beyond)
                 for j in (first + near).tolist():
+                    if (i, j) in tied:
+                        continue
                     at = np.array([q[(i, j)[body], c] for body, c in contacts.reads])
                     (values,) = contacts.gaps.kernel.at(at, numbers.ctypes.data, 0)
                     yield (i, j), contacts.gaps.names, values
@@ -397,6 +431,8 @@ class MovingBodies(Value):
             body, places = kind.body, np.ascontiguousarray(q[at, : kind.dimension])
             gaps = np.full((kind.count, len(body.contacts)), np.inf)
             for call in body.gaps:
+                if body.reads_time(call):
+                    continue
                 (values,) = call.family.kernel.over(
                     places[:, list(call.reads)], call.parameters.ctypes.data, 0
                 )
@@ -431,6 +467,8 @@ class IdenticalBodies(MovingBodies):
         A body leaves when this coordinate exceeds the limit; -1: never.
     names : tuple of str
         Of the bodies; of a dense system of those that it consists of.
+    ties : Ties
+        As of :class:`MovingBodies`; none by default.
     """
 
     body: MovingBody
@@ -442,6 +480,7 @@ class IdenticalBodies(MovingBodies):
     exit_coordinate: int = -1
     exit_limit: float = 0.0
     names: tuple[str, ...] = ()
+    ties: Ties = NO_TIES
 
     @property
     def kinds(self) -> "tuple[IdenticalBodies, ...]":
@@ -480,12 +519,15 @@ class SeveralKinds(MovingBodies):
         Contacts of bodies of different kinds, by their numbers, the lower first.
     period : tuple of float
         As of :class:`IdenticalBodies`; those of the kinds are not used.
+    ties : Ties
+        The same.
     """
 
     named: Mapping[str, IdenticalBodies]
     between: Mapping[tuple[int, int], PairContacts]
     period: tuple[float, ...] = (np.inf, np.inf)
     substrate_speed: float = 0.0
+    ties: Ties = NO_TIES
 
     @property
     def kinds(self) -> tuple[IdenticalBodies, ...]:

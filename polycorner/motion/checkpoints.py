@@ -243,7 +243,9 @@ class SavedRun:
         steps = np.minimum(self.every * np.arange(frames), self.steps)
         if finished != (steps[-1] == self.steps):
             refuse("finished", f"a run of {self.steps} steps", int(steps[-1]))
-        if (np.array(recorder.columns["t"]) != engine.start + steps * engine.dt).any():
+        if (
+            np.array(recorder.columns["t"]) != engine.start + (engine.before + steps) * engine.dt
+        ).any():
             refuse("t", "the times of the steps", "others")
 
 

@@ -2,6 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -141,3 +142,11 @@ def over(values: Array, size: Array | float) -> Array:
 def length(p: Array) -> Array:
     """Return Euclidean lengths of vectors ``(..., d)``; squares would over- and underflow."""
     return np.asarray(np.hypot.reduce(p, axis=-1))
+
+
+def in_words(laws: Iterable[tuple[str, ConvexSet, ConvexSet]]) -> str:
+    """Return laws of friction in words: of each its kind, its static and its dynamic set."""
+    return "; ".join(
+        f"{kind} {sticks}" + (f", then {slides}" if slides != sticks else "")
+        for kind, sticks, slides in laws
+    )

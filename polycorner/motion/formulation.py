@@ -135,10 +135,18 @@ class Formulation:
     further: Sequence[Call] = ()
 
     @classmethod
-    def of(cls, coordinates: Sequence[str], parameters: Sequence[str], laws: Laws) -> "Formulation":
+    def of(
+        cls,
+        coordinates: Sequence[str],
+        parameters: Sequence[str],
+        laws: Laws,
+        *,
+        timed: bool = False,
+    ) -> "Formulation":
         """Return the formulation of given laws, checking each symbol and the kinetic energy.
 
-        Where a force or a slip depends on the time, it is a further parameter.  Forces are those in
+        Where a force or a slip depends on the time, or equations do (``timed``), it is a further
+        parameter.  Forces are those in
         the middle of a step, slips those of the velocities at its end.
         """
         import sympy
@@ -153,7 +161,7 @@ class Formulation:
                 s if isinstance(s, SmoothFunction) else s.xreplace(ahead) for s in laws.slips
             )
             laws = replace(laws, slips=slips)
-        further = [TIME] * (driven or paced) + [STEP] * paced
+        further = [TIME] * (driven or paced or timed) + [STEP] * paced
         known = (*parameters, *further)
         shared = {i: s for i, s in enumerate(laws.slips) if isinstance(s, SmoothFunction)}
         sizes = len(laws.slips), len(laws.loads)
@@ -391,6 +399,20 @@ def energies(
     return float(values[0]), float(values[1])
 
 
+def force_slopes(
+    formulation: Formulation, parameters: Array, scales: Array, q: Array, v: Array
+) -> Array:
+    """Return the derivatives ``(k, k)`` of all forces by the coordinates, from differences."""
+    k, numbers = len(scales), np.array([*parameters, 0.0])
+    changes = np.diag(1e-5 * scales)
+    places = np.concatenate([q + changes, q - changes])
+    at = np.column_stack([places, np.tile(v, (2 * k, 1))])
+    (values,) = formulation.forces.kernel.over(at, numbers.ctypes.data, 0)
+    first = k * (k + 1) // 2
+    forth, back = values[:k, first : first + k], values[k:, first : first + k]
+    return np.asarray((forth - back).T / (2 * np.diag(changes)))
+
+
 def highest_square(
     formulation: Formulation,
     parameters: Array,
@@ -405,17 +427,11 @@ def highest_square(
     where the forces ``lam_j`` balance the others across the equations; ``equations`` has gradients
     ``(j, k)`` and Hessians ``(j, k, k)``.
     """
-    k = len(scales)
     mass, forces = mass_and_forces(formulation, parameters, q, v)
-    force, stiffness = forces[:k], np.empty((k, k))
+    force = forces[: len(scales)]
     if not np.isfinite(force).all():
         return 0.0  # the first step says what is wrong
-    for i, scale in enumerate(scales):
-        change = np.zeros(k)
-        change[i] = 1e-5 * scale
-        _, forth = mass_and_forces(formulation, parameters, q + change, v)
-        _, back = mass_and_forces(formulation, parameters, q - change, v)
-        stiffness[:, i] = -(forth - back)[:k] / (2 * change[i])
+    stiffness = -force_slopes(formulation, parameters, scales, q, v)
     if not np.isfinite(stiffness).all():
         return 0.0  # at the edge of where the force is defined
     if equations is not None:

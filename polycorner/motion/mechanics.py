@@ -1,6 +1,7 @@
 """States, and the base of everything that a simulation can move."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,25 @@ from polycorner.values import Checked, Value
 
 
 @dataclass(frozen=True, eq=False)
+class Memory(Value):
+    """What the engine of a run knows beside placements and velocities, to go on bit for bit.
+
+    Attributes
+    ----------
+    system : MechanicalSystem
+    start, end, dt : float
+        Times at which the run began and ended, and its step.
+    arrays : mapping from str to array
+    """
+
+    system: "MechanicalSystem"
+    start: float
+    end: float
+    dt: float
+    arrays: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
 class State(Checked):
     """Placement, velocity, and the friction contacts that stick.
 
@@ -27,12 +47,16 @@ class State(Checked):
         ``N`` bodies.
     sticking : (F,) or (N, F) array of bool
         For each friction contact, whether its slip was exactly zero: its static set holds.
+    memory : Memory, optional
+        Of ``Trajectory.last``: a run of the same system that goes on with the same step does so bit
+        for bit.  Any other begins anew, from placements and velocities.
     """
 
     time: float
     q: Array
     v: Array
     sticking: NDArray[np.bool_]
+    memory: Memory | None = None
 
 
 class MechanicalSystem(Value, ABC):

@@ -5,11 +5,26 @@ from collections.abc import Callable
 import numpy as np
 
 from polycorner.formulas.bundles import Bundle
+from polycorner.formulas.families import Family
+from polycorner.motion.bodies import MovingBodies
 from polycorner.motion.noise import OPTIONS
 from polycorner.polyhedra.faces import project
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.quotients import Quotient
-from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array, Manifold
+
+
+def gap_unit(manifold: Manifold) -> float:
+    """Return the least scale of coordinates that are lengths, by which gaps are scaled.
+
+    Coordinates in radians, of unit vectors and of quaternions have no length, whatever the unit of
+    the others: were theirs the least scale, a motion would depend on whether it is written in
+    metres or millimetres.  If there are no others, it is the least of all.
+    """
+    turned = {name for factor in manifold.factors for name in factor.names}
+    each = zip(manifold.names, manifold.units, manifold.scales, strict=True)
+    lengths = [scale for name, unit, scale in each if unit != "rad" and name not in turned]
+    return min(lengths or manifold.scales)
 
 
 def check_contacts(polyhedron: Polyhedron, q: Array, who: Callable[[str, int], str]) -> None:
@@ -27,7 +42,7 @@ def check_contacts(polyhedron: Polyhedron, q: Array, who: Callable[[str, int], s
         return
     gaps = polyhedron.values(q)
     worst = tuple(map(int, np.unravel_index(int(np.argmin(gaps)), gaps.shape)))
-    if gaps[worst] < -OPTIONS.overlap * min(polyhedron.manifold.scales):
+    if gaps[worst] < -OPTIONS.overlap * gap_unit(polyhedron.manifold):
         contact = polyhedron.names[worst[-1]]
         subject = who(contact, worst[0] if len(worst) > 1 else 0)
         at = "" if repr(contact) in subject else f" at contact {contact!r}"
@@ -74,6 +89,75 @@ def check_velocities(
                 f"{_which(at, called)}; they change it at the rate {rates[at]:.6g}"
             )
             raise ValueError(msg)
+
+
+def check_followed(
+    family: Family, scales: Array, q: Array, v: Array, time: float, called: Callable[[int], str]
+) -> None:
+    """Raise ValueError where equations with the time fail or velocities do not follow them.
+
+    The variables of ``family`` are the coordinates of a body, then the time; ``q`` and ``v`` are
+    ``(n,)`` or ``(N, n)``.
+    """
+    points = np.concatenate([q, np.full((*q.shape[:-1], 1), time)], axis=-1)
+    values, slopes = family.evaluate(points, order=1)
+    rows, pace = slopes[..., :-1] * scales, slopes[..., -1]
+    sizes = np.linalg.norm(rows, axis=-1)
+    rates = (rows @ (v / scales)[..., None])[..., 0] + pace
+    most = sizes * np.linalg.norm(v / scales, axis=-1)[..., None] + abs(pace)
+    for at in np.ndindex(values.shape):
+        name = repr(family.names[at[-1]]) + _which(at, called)
+        if not abs(values[at]) <= OPTIONS.overlap * sizes[at]:
+            msg = (
+                f"q: expected equation {name} to hold at the time {time:g}; its value is "
+                f"{values[at]:.6g}"
+            )
+            raise ValueError(msg)
+        if abs(rates[at]) > OPTIONS.overlap * most[at]:
+            msg = (
+                f"v: expected velocities that follow equation {name} at the time {time:g}; they "
+                f"are off by the rate {rates[at]:.6g}"
+            )
+            raise ValueError(msg)
+
+
+def check_ties(bodies: MovingBodies, q: Array, v: Array, time: float) -> None:
+    """Raise ValueError if a limit or equation of a tie does not hold, or not at the velocities.
+
+    Parameters
+    ----------
+    bodies : MovingBodies
+    q, v : (N, k) array
+    time : float
+    """
+    ties, most = bodies.ties, OPTIONS.overlap
+    for which, (values, slopes) in ties.evaluate("rows", q, None, time, 1):
+        limits = ties.forms[ties.form[which[0]]].limits
+        for t, value, slope in zip(which, values, slopes, strict=True):
+            ends = [i for i in ties.bodies[t] if i >= 0]
+            units, speeds = np.ones(2 * q.shape[1]), np.zeros(2 * q.shape[1])
+            units[: len(ends) * q.shape[1]] = bodies.units[ends].ravel()
+            speeds[: len(ends) * q.shape[1]] = (v[ends] * bodies.units[ends]).ravel()
+            across = slope[:, :-1] / units
+            sizes = np.linalg.norm(across, axis=1)
+            rates, fast = across @ speeds + slope[:, -1], sizes * np.linalg.norm(speeds)
+            who = " and ".join(bodies.called(i).removeprefix("body ") for i in ends)
+            for o, (x, size) in enumerate(zip(value.tolist(), sizes.tolist(), strict=True)):
+                name = f"{ties.names[ties.row_starts[t] + o]!r}"
+                name += f" of {'body' if len(ends) == 1 else 'bodies'} {who}"
+                if o < limits and not x >= -most * size:
+                    msg = f"q: expected limit {name} not to be passed; its value is {x:.6g}"
+                    raise ValueError(msg)
+                if o >= limits and not (size > 0 and abs(x) <= most * size):
+                    wrong = f"its value is {x:.6g}" if size > 0 else "its gradient is zero"
+                    msg = f"q: expected equation {name} to hold; {wrong}"
+                    raise ValueError(msg)
+                if o >= limits and abs(rates[o]) > most * max(fast[o], abs(slope[o, -1])):
+                    msg = (
+                        f"v: expected velocities at which equation {name} continues to hold; it "
+                        f"changes at the rate {rates[o]:.6g}"
+                    )
+                    raise ValueError(msg)
 
 
 def bends(polyhedron: Polyhedron, q: Array) -> tuple[Array, Array] | None:

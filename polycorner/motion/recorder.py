@@ -13,7 +13,18 @@ import numpy as np
 
 from polycorner import forms
 from polycorner.checks import refuse
-from polycorner.motion.engine.arrays import CONTACTS, STEPS, EngineState, declarations
+from polycorner.motion.engine.arrays import (
+    APPLIED_WORK,
+    CONTACTS,
+    DISSIPATED,
+    DRIVE_WORK,
+    NOISE_WORK,
+    PENETRATION,
+    STEPS,
+    SUBSTRATE_WORK,
+    EngineState,
+    declarations,
+)
 from polycorner.motion.engine.driver import Engine
 from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.events import EventKind, EventTable, joined
@@ -26,9 +37,10 @@ if TYPE_CHECKING:
 
     from polycorner.motion.mechanics import MechanicalSystem
 
-FLAGS = ("sticks", "touches", "alive", "rests", "asleep", "watched")
-NOW = {"rank", "body_of_rank"}  # not in states saved before bodies had ranks
-WORK = ("substrate", "applied", "noise")
+FLAGS = ("sticks", "touches", "alive", "rests", "asleep", "watched", "tie_touches", "tie_sticks")
+TIES = {name for name in EngineState._fields if name.startswith("tie_")}
+NOW = {"rank", "body_of_rank", *TIES}  # not in states saved before bodies had ranks, or ties
+WORK = {"substrate": SUBSTRATE_WORK, "applied": APPLIED_WORK, "noise": NOISE_WORK}
 
 
 def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
@@ -54,7 +66,7 @@ def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
         "elapsed": (0.0, engine.dt),
     }
     for name, declared in declarations(EngineState).items():
-        if name in NOW - arrays.keys():
+        if name in NOW - arrays.keys() and (name not in TIES or not bodies.ties.bodies):
             continue
         kind = "f" if declared.kind is np.float64 else "i"
         least, most = ranges.get(name, (-np.inf, np.inf))
@@ -245,7 +257,9 @@ class Recorder:
         bodies, columns = self.engine.bodies, self.columns
         touching = [[t for t in some if t[1] not in system.hidden] for some in self.touching]
         sums, energies = np.array(columns["sums"]), np.array(columns["energies"])
-        work = {name: sums[:, i] for i, name in enumerate(WORK)}
+        work = {name: sums[:, i] for name, i in WORK.items()}
+        if any(kind.body.timed for kind in bodies.kinds) or bodies.ties.drives:
+            work["drive"] = sums[:, DRIVE_WORK]
         if any(kind.exit_coordinate >= 0 for kind in bodies.kinds):
             work["left"] = np.array(self.left)
         return Trajectory(
@@ -260,10 +274,10 @@ class Recorder:
             friction=friction_table(self.friction),
             kinetic=energies[:, 0],
             potential=energies[:, 1],
-            dissipated={cause: sums[:, 5 + i] for i, cause in enumerate(bodies.causes)},
+            dissipated={cause: sums[:, DISSIPATED + i] for i, cause in enumerate(bodies.causes)},
             work=work,
             events=joined(self.events, bodies.contact_names).in_time(),
-            max_penetration=float(self.engine.motion.sums[3]),
+            max_penetration=float(self.engine.motion.sums[PENETRATION]),
             effort=self.engine.effort,
             **run,
         )

@@ -184,3 +184,14 @@ def friction_table(parts: Iterable[FrictionTable]) -> FrictionTable:
         np.concatenate([part.whole for part in every]),
         np.concatenate([part.forces for part in every]),
     )
+
+
+def overlapping(scene: Scene | None, called: str, contact: str, i: int) -> str:
+    """Return what overlaps at a contact of a body with the surroundings, for a message."""
+    parties = () if scene is None else scene.parties((i,), contact)
+    if scene is None or not parties:
+        return f"contact {contact!r}{called and f' of {called}'} overlaps"
+    one, two = parties
+    if two in scene.walls:
+        return f"body {one!r} and wall {two!r} overlap"
+    return f"bodies {one!r} and {two!r} overlap"

@@ -67,7 +67,7 @@ from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
 from polycorner.motion.bodies import IdenticalBodies, MovingBodies
 from polycorner.motion.formulation import mass_and_forces
-from polycorner.motion.mechanics import MechanicalSystem, State
+from polycorner.motion.mechanics import MechanicalSystem, Memory, State
 from polycorner.motion.noise import OPTIONS, Noise, Solver
 from polycorner.progress import Progress
 from polycorner.spaces.manifold import Array
@@ -161,6 +161,7 @@ def simulate(
     recorder, saved = Recorder(engine), None
     if checkpoint is not None:
         told = _parameters(system, state, end, dt, stride, noise, solver)
+        told |= {"steps before": engine.before} if engine.before else {}
         saved = SavedRun(checkpoint, told, steps, stride)
     with nullcontext() if saved is None else saved.alone():
         if saved is None or not saved.begin(recorder):
@@ -170,9 +171,11 @@ def simulate(
         except SolverError as error:
             error.state = _present(engine, state)
             raise
-    return recorder.trajectory(
-        system, noise=noise, solver=solver, every=stride, t_end=end, steps_per_second=rate
-    )
+    arrays = {name: array.copy() for name, array in engine.save().items()}
+    memory = Memory(system, engine.start, engine.time, engine.dt, arrays)
+    last = replace(_present(engine, state), memory=memory)
+    run = {"noise": noise, "solver": solver, "every": stride, "t_end": end, "last": last}
+    return recorder.trajectory(system, **run, steps_per_second=rate)
 
 
 def _steps(duration: float, dt: float) -> tuple[int, float]:
@@ -216,7 +219,7 @@ def _advance(
     counted, spent, first, last_save = 0, 0.0, True, time.monotonic()
     while engine.steps < steps and not asked.is_set():
         before, clock = engine.steps, time.perf_counter()
-        if not before:
+        if not before and not engine.before:
             recorder.begin()
         recorder.advance(min(stride, steps - before) - (engine.steps - before))
         if not first:
@@ -299,11 +302,13 @@ def start(
     placed = bodies.padded(state.q), bodies.padded(state.v)
     bodies.check_places(*placed, dt)
     _check_mass(bodies, *placed)
-    system.check_placement(state.q)
-    largest, why = system.largest_step(state)
-    if dt > largest:
-        msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
-        raise ValueError(msg)
+    memory = state.memory if _goes_on(system, state, dt) else None
+    if memory is None:  # what goes on was let in; bodies that have left stand where others may be
+        system.check_placement(state.q)
+        largest, why = system.largest_step(state)
+        if dt > largest:
+            msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
+            raise ValueError(msg)
     noise = Noise() if noise is None else instance("noise", noise, Noise)
     every = [name for kind in bodies.kinds for name in kind.body.formulation.coordinates]
     names("kicks", noise.kicks, list(dict.fromkeys(every)))
@@ -313,7 +318,22 @@ def start(
         law = bodies.body.formulation
         paced = replace(bodies.body, parameters=law.at(bodies.body.parameters, step=dt))
         bodies = replace(bodies, body=paced)
-    return Engine(bodies, *placed, state.sticking, dt, start=state.time, noise=noise, solver=solver)
+    begun = state.time if memory is None else memory.start
+    engine = Engine(bodies, *placed, state.sticking, dt, start=begun, noise=noise, solver=solver)
+    if memory is not None:
+        engine.resume(memory.arrays)
+    return engine
+
+
+def _goes_on(system: MechanicalSystem, state: State, dt: float) -> bool:
+    """Whether a state is the last of a run of the same system with the same step, unchanged."""
+    memory = state.memory
+    if memory is None or memory.system is not system or memory.dt != dt:
+        return False
+    known, bodies = memory.arrays, system.bodies
+    given = bodies.padded(state.q), bodies.padded(state.v), np.ravel(state.sticking)
+    kept = known["q"], known["v"], known["sticks"]
+    return state.time == memory.end and all(map(np.array_equal, given, kept))
 
 
 def _check_mass(bodies: MovingBodies, q: Array, v: Array) -> None:

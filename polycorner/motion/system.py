@@ -12,28 +12,42 @@ from numpy.typing import ArrayLike, NDArray
 from polycorner.checks import names, real, reals, refuse, whole
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.expressions import as_expression, as_expressions, written
+from polycorner.formulas.families import Family
 from polycorner.kinds import check_fields, checked
-from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody, PairContacts
+from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
 from polycorner.motion.contacts import (
     ContactFamily,
     Friction,
     periods_of,
     position_of,
     slip_text,
+    time_symbol,
 )
-from polycorner.motion.convex_sets import ConvexSet
+from polycorner.motion.convex_sets import in_words
 from polycorner.motion.formulation import (
+    TIME,
     Formulation,
     Laws,
     energies,
     highest_damping,
     highest_square,
 )
-from polycorner.motion.hulls.contacts import HullContacts
+from polycorner.motion.hulls.contacts import HullContacts, beside
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import OPTIONS
-from polycorner.motion.placements import bends, check_contacts, check_equations, check_velocities
-from polycorner.motion.scenes import Scene
+from polycorner.motion.placements import (
+    bends,
+    check_contacts,
+    check_equations,
+    check_followed,
+    check_ties,
+    check_velocities,
+    gap_unit,
+)
+from polycorner.motion.scenes import Scene, overlapping
+from polycorner.motion.stiffness import PlacedKind, tied_square
+from polycorner.motion.tie_forms import Ties
+from polycorner.motion.ties import Tie, compiled_ties, described_tie
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.printing import Printed, Sheet, brief, facts, few, listed, number
 from polycorner.signatures import shown
@@ -82,6 +96,12 @@ class System(MechanicalSystem, Printed):
         Names of the bodies in space, and where they touch; of systems of an arrangement.
     hulls : sequence of HullContacts, optional
         Contacts of sharp hulls, of a body with its surroundings or of two that the system is of.
+    rheonomic : mapping from str to sympy.Expr, optional
+        Further equations ``h(q, t) = 0``, functions of coordinates and of the time
+        (:func:`time_symbol`), as of a prescribed motion.  Their forces have no limit, and are along
+        the gradient by the coordinates; their work is ``Trajectory.work["drive"]``.
+    ties : sequence of Tie, optional
+        Joints, limits, springs and drives between two of the bodies, or of one and the world.
 
     Raises
     ------
@@ -107,26 +127,6 @@ class System(MechanicalSystem, Printed):
     >>> path = simulate(bead, bead.state([0.0, 0.0], [2.0, 0.0]), 0.001, 0.001)
     >>> [(name, round(force, 1)) for _, name, force in path.touching[-1]]  # m (g + v^2 y'')
     [('wire', 17.8)]
-
-    Three discs of radius 1 between two walls, the third on top of the others:
-
-    >>> from polycorner.motion import ContactFamily, pair_coordinates
-    >>> (x1, y1), (x2, y2) = pair_coordinates(M)
-    >>> distance = sympy.sqrt((x2 - x1) ** 2 + (y2 - y1) ** 2)
-    >>> tray = Polyhedron(M, {"floor": y - 1, "left": x - 1, "right": 4 - x})
-    >>> discs = System(
-    ...     tray,
-    ...     (vx**2 + vy**2) / 2,
-    ...     9.81 * y,
-    ...     count=3,
-    ...     between=ContactFamily({"discs": distance - 2}, reach=2.0),
-    ... )
-    >>> start = discs.state([[1.0, 1.0], [4.0, 1.0], [2.5, 3.0]])
-    >>> path = simulate(discs, start, 2.0, 1e-3)
-    >>> [(bodies, contact) for bodies, contact, _ in path.touching[-1] if len(bodies) == 2]
-    [((0, 2), 'discs'), ((1, 2), 'discs')]
-    >>> round(float(path.q[-1, 2, 1]), 3)  # 1 + sqrt(2^2 - 1.5^2)
-    2.323
     """
 
     polyhedron: Polyhedron
@@ -141,6 +141,8 @@ class System(MechanicalSystem, Printed):
     exits: Mapping[str, float] = field(default_factory=dict)
     scene: Scene | None = None
     hulls: tuple[HullContacts, ...] = ()
+    rheonomic: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
+    ties: tuple[Tie, ...] = ()
 
     def __repr__(self) -> str:
         """Return the bodies, and the numbers of coordinates, contacts and laws of friction."""
@@ -169,7 +171,7 @@ class System(MechanicalSystem, Printed):
         contacts = listed(
             "Contacts",
             ("contact", "friction", "restitution"),
-            chain(self._contact_rows(), () if pairs is None else _pair_rows(pairs)),
+            chain(self._contact_rows(), () if pairs is None else pairs.rows()),
             len(self._normals) + (0 if pairs is None else len(pairs.gaps.names)),
         )
         return Sheet("System", (facts((what, told) for what, told in about if told), contacts))
@@ -179,15 +181,17 @@ class System(MechanicalSystem, Printed):
         for f in self.friction:
             laws.setdefault(str(f.load), []).append(f)
         bounces = [number(e, 6) for e in self.restitutions.tolist()]
-        bounces += ["an equation"] * len(self.polyhedron.equations)
+        bounces += ["an equation"] * (len(self._normals) - len(self.contacts))
         for name, e in zip(self._normals, bounces, strict=True):
             own = [(f.kind, f.static, f.moving) for f in laws.get(name, ())]
-            yield name, _told(own), e
+            yield name, in_words(own), e
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kinetic", as_expression("kinetic", self.kinetic))
         object.__setattr__(self, "potential", as_expression("potential", self.potential))
-        object.__setattr__(self, "forces", as_expressions("forces", self.forces))
+        for argument in ("forces", "rheonomic"):
+            given = as_expressions(argument, getattr(self, argument))
+            object.__setattr__(self, argument, given)
         check_fields(self)
         if self.polyhedron.is_union:
             expected = "an intersection of inequalities and equations, such as a convex piece"
@@ -197,6 +201,13 @@ class System(MechanicalSystem, Printed):
             if isinstance(friction.load, str) and friction.load not in self._normals:
                 known = f"one of the contacts {', '.join(self._normals)} or an expression"
                 refuse("load", f"{known} for friction {friction.name!r}", friction.load)
+        for name, e in self.rheonomic.items():
+            if name in (*self.contacts, *self.polyhedron.equation_names):
+                refuse("rheonomic", "names of their own", name)
+            if e.free_symbols - {*self.manifold.symbols, time_symbol()} or not e.free_symbols & {
+                *self.manifold.symbols
+            }:
+                refuse("rheonomic", f"a formula in coordinates and the time for {name!r}", e)
         whole("count", self.count, least=1)
         if self.between is not None:
             names("position", self.between.position, self.manifold.names)
@@ -204,8 +215,17 @@ class System(MechanicalSystem, Printed):
                 refuse("position", "up to three coordinates", self.between.position)
         self._check_single("substrate")
         self._check_single("exits")
+        self._check_ties()
         _ = self.restitutions, self.formulation, self.bodies
         super().__post_init__()
+
+    def _check_ties(self) -> None:
+        object.__setattr__(self, "ties", tuple(self.ties))
+        if self.ties and self.exits:
+            refuse("exits", "none in a system whose bodies have ties", dict(self.exits))
+        if self.ties and self.rheonomic:
+            expected = "none beside ties, whose equations may have the time themselves"
+            refuse("rheonomic", expected, [*self.rheonomic])
 
     def _check_single(self, argument: str) -> None:
         given = getattr(self, argument)
@@ -233,7 +253,12 @@ class System(MechanicalSystem, Printed):
     @property
     def _normals(self) -> tuple[str, ...]:
         """Names of all normal forces: of contacts, then of equations."""
-        return (*self.contacts, *self.polyhedron.equation_names)
+        return (*self.contacts, *self.polyhedron.equation_names, *self.rheonomic)
+
+    @cached_property
+    def _followed(self) -> Family:
+        """The equations with the time, functions of the coordinates and of it."""
+        return Family.of(self.rheonomic, (*self.manifold.names, TIME))
 
     @cached_property
     def restitutions(self) -> Array:
@@ -270,7 +295,7 @@ class System(MechanicalSystem, Printed):
         """The compiled equations of motion of a body."""
         slips = tuple(e for f in self.friction for e in f.slip)
         laws = Laws(self.kinetic, self.potential, self.forces, slips, self._loads)
-        return Formulation.of(self.manifold.names, (), laws)
+        return Formulation.of(self.manifold.names, (), laws, timed=bool(self.rheonomic))
 
     @cached_property
     def parameters(self) -> Array:
@@ -286,6 +311,11 @@ class System(MechanicalSystem, Printed):
         )
         scales, coordinates = self.manifold.scale_array, self.manifold.names
         gaps, rubbing, slips = self._of_hulls
+        equations = len(self._normals) - len(self.contacts)
+        if timed := len(self.rheonomic):
+            reads, last = range(len(coordinates) + 1), range(len(self._normals))[-timed:]
+            call = Call(self._followed, (*reads,), np.empty(0), (*last,), (*range(timed),))
+            gaps = [*gaps, call]
         formulation = replace(self.formulation, further=slips) if slips else self.formulation
         body = MovingBody(
             formulation,
@@ -293,10 +323,10 @@ class System(MechanicalSystem, Printed):
             friction + rubbing,
             gaps,
             self._normals,
-            np.append(self.restitutions, np.zeros(len(self.polyhedron.equations))),
+            np.append(self.restitutions, np.zeros(equations)),
             1 / scales,
-            float(scales.min()),
-            len(self.polyhedron.equations),
+            gap_unit(self.manifold),
+            equations,
         )
         between = self.between if self.count > 1 else None
         given = () if self.between is None else self.between.position
@@ -307,7 +337,8 @@ class System(MechanicalSystem, Printed):
         exit_at, limit = leaving[0] if leaving else (-1, 0.0)
         told = contacts, position, periods_of(self.manifold, position), float(speed)
         names = () if self.scene is None else self.scene.names
-        return IdenticalBodies(body, self.count, *told, exit_at, float(limit), names)
+        ties = compiled_ties(self.ties, [(self.manifold, self.count)], names)
+        return IdenticalBodies(body, self.count, *told, exit_at, float(limit), names, ties)
 
     @cached_property
     def _of_hulls(self) -> tuple[list[Call], tuple[FrictionContact, ...], list[Call]]:
@@ -318,24 +349,8 @@ class System(MechanicalSystem, Printed):
             replace(call, rows=tuple(r + more if r >= first else r for r in call.rows))
             for call in self.polyhedron.bundle.calls
         ]
-        rubbing: list[FrictionContact] = []
-        slips = []
-        for hulls in self.hulls:
-            gaps.append(hulls.gaps_of(names, first))
-            rows, some = (
-                hulls.dimension - 1,
-                [g for g, n in enumerate(hulls.names) if n in hulls.friction],
-            )
-            for g in some:
-                name = hulls.names[g]
-                sets = hulls.friction[name]
-                rubbing.append(
-                    FrictionContact(f"{name} slips", rows, *sets, first + g, (), "sliding")
-                )
-            if some:
-                slips.append(hulls.slips_of(names, some, row))
-            first, row = first + len(hulls.names), row + rows * len(some)
-        return gaps, tuple(rubbing), slips
+        further, rubbing, slips = beside(self.hulls, names, first, row)
+        return gaps + further, rubbing, slips
 
     # -------------------------------------------------------------------------------------- states
 
@@ -352,7 +367,8 @@ class System(MechanicalSystem, Printed):
         q : (n,) or (count, n) array, or mapping from str to float
             Placement of the body, or of all bodies.
         v : array of the same shape, optional
-            Velocities, along all equations; default those of the substrate.
+            Velocities, along all equations, and with those that have the time; default those of the
+            substrate.
         time : float, optional
         """
         if self.count == 1 and (isinstance(q, Mapping) or reals("q", q).ndim < 2):
@@ -371,7 +387,11 @@ class System(MechanicalSystem, Printed):
                 refuse(argument, f"shape ({self.count}, {self.manifold.size})", array.shape)
         self.check_placement(places)
         check_velocities(self.polyhedron, places, speeds, self.bodies.called)
-        time = real("time", time, unit="s")
+        time, shape = real("time", time, unit="s"), (self.count, self.manifold.size)
+        if self.rheonomic:
+            scales = self.manifold.scale_array
+            check_followed(self._followed, scales, places, speeds, time, self.bodies.called)
+        check_ties(self.bodies, places.reshape(shape), speeds.reshape(shape), time)
         return State(time, places, speeds, self.sticks(places, speeds, time))
 
     @checked
@@ -388,7 +408,7 @@ class System(MechanicalSystem, Printed):
         return overlapping(self.scene, called, contact, i)
 
     def _check_hulls(self, q: Array) -> None:
-        deep = -OPTIONS.overlap * min(self.manifold.scales)
+        deep = -OPTIONS.overlap * gap_unit(self.manifold)
         for hulls in self.hulls:
             gaps = hulls.values(self.manifold.names, q.reshape(-1, self.manifold.size))
             i, g = np.unravel_index(int(gaps.argmin()), gaps.shape)
@@ -417,16 +437,28 @@ class System(MechanicalSystem, Printed):
             found.insert(0, rests.reshape(*shape, len(self.friction)))
         return np.concatenate(found, axis=-1)
 
+    def equations_at(self, q: Array, time: float) -> tuple[Array, Array] | None:
+        """Return gradients ``(k, n)`` and Hessians ``(k, n, n)`` of all equations, if any."""
+        held = bends(self.polyhedron, q)
+        if not self.rheonomic:
+            return held
+        _, *found = self._followed.evaluate(np.append(q, time), order=2)
+        rows, curved = found[0][:, :-1], found[1][:, :-1, :-1]
+        if held is None:
+            return rows, curved
+        return np.concatenate([held[0], rows]), np.concatenate([held[1], curved])
+
     @checked
     def energies(self, state: State) -> tuple[float, float]:
-        """Return kinetic and potential energy of all bodies."""
+        """Return kinetic and potential energy of all bodies and ties."""
         n = self.manifold.size
         each = [
             energies(self.formulation, self.parameters, q, v)
             for q, v in zip(state.q.reshape(-1, n), state.v.reshape(-1, n), strict=True)
         ]
         kinetic, potential = np.sum(each, axis=0)
-        return float(kinetic), float(potential)
+        tied = self.bodies.ties.energy(state.q.reshape(-1, n))
+        return float(kinetic), float(potential) + tied
 
     @checked
     def largest_step(self, state: State) -> tuple[float, str]:
@@ -436,7 +468,8 @@ class System(MechanicalSystem, Printed):
         the velocity in the middle of a step resolve.
         """
         n = self.manifold.size
-        return leapfrog_limit(self, state.q.reshape(-1, n), state.v.reshape(-1, n))
+        placed = self, state.q.reshape(-1, n), state.v.reshape(-1, n)
+        return leapfrog_limit([placed], self.bodies.ties, state.time)
 
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""
@@ -456,6 +489,7 @@ class System(MechanicalSystem, Printed):
         told |= {f"force {name}": written(force) for name, force in self.forces.items()}
         told |= {f"gap {f.name}": written(f.expression) for f in self.polyhedron.functions}
         told |= {f"equation {h.name}": written(h.expression) for h in self.polyhedron.equations}
+        told |= {f"equation {name}": written(h) for name, h in self.rheonomic.items()}
         told |= {
             f"friction {f.name}": {
                 "slip": [*map(slip_text, f.slip)],
@@ -468,48 +502,38 @@ class System(MechanicalSystem, Printed):
             told |= between.described()
         if self.hulls:
             told["hulls"] = [hulls.described() for hulls in self.hulls]
+        if self.ties:
+            told["ties"] = [described_tie(tie) for tie in self.ties]
         return told
 
 
-def leapfrog_limit(system: System, places: Array, speeds: Array) -> tuple[float, str]:
-    """Return the largest step of bodies ``(N, n)`` in s, and what limits it."""
-    scales, law, known = system.manifold.scale_array, system.formulation, system.parameters
+def leapfrog_limit(
+    placed: Sequence[tuple[System, Array, Array]], ties: Ties, time: float
+) -> tuple[float, str]:
+    """Return the largest step in s of bodies of several kinds, and what limits it.
+
+    ``placed`` has one body of each kind, and places and velocities ``(N, n)``.
+    """
     squared, damping = 0.0, 0.0
-    for q, v in zip(places, speeds, strict=True):
-        held = bends(system.polyhedron, q)
-        squared = max(squared, highest_square(law, known, scales, q, v, held))
-        if system.forces:
-            rows = None if held is None else held[0]
-            damping = max(damping, highest_damping(law, known, scales, q, v, rows))
+    kinds = []
+    for system, places, speeds in placed:
+        scales, law, known = system.manifold.scale_array, system.formulation, system.parameters
+        for q, v in zip(places, speeds, strict=True):
+            held = system.equations_at(q, time)
+            if not ties.bodies:
+                squared = max(squared, highest_square(law, known, scales, q, v, held))
+            if system.forces:
+                rows = None if held is None else held[0]
+                damping = max(damping, highest_damping(law, known, scales, q, v, rows))
+        if ties.bodies:
+            own = bends(system.polyhedron, places)
+            kinds.append(PlacedKind(law, known, scales, places, speeds, own))
+    if ties.bodies:
+        squared = tied_square(kinds, ties, time)
     longest = 2 / math.sqrt(squared) if squared > 1e-12 else math.inf
     if damping * longest > 1.5:
         return 1.5 / damping, "beyond which the damping is not resolved"
     return longest, "beyond which the motion is unstable"
-
-
-def overlapping(scene: Scene | None, called: str, contact: str, i: int) -> str:
-    """Return what overlaps at a contact of a body with the surroundings, for a message."""
-    parties = () if scene is None else scene.parties((i,), contact)
-    if scene is None or not parties:
-        return f"contact {contact!r}{called and f' of {called}'} overlaps"
-    one, two = parties
-    if two in scene.walls:
-        return f"body {one!r} and wall {two!r} overlap"
-    return f"bodies {one!r} and {two!r} overlap"
-
-
-def _pair_rows(contacts: PairContacts) -> Iterator[tuple[str, str, str]]:
-    told = _told([(law.cause, law.static, law.dynamic) for law in contacts.laws])
-    for name in contacts.gaps.names:
-        yield name, told, number(contacts.restitution, 6)
-
-
-def _told(laws: Sequence[tuple[str, ConvexSet, ConvexSet]]) -> str:
-    """Return laws of friction in words."""
-    return "; ".join(
-        f"{kind} {sticks}" + (f", then {slides}" if slides != sticks else "")
-        for kind, sticks, slides in laws
-    )
 
 
 def _short(energy: "sympy.Expr | float") -> str:

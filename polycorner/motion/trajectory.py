@@ -14,7 +14,7 @@ from polycorner import checks
 from polycorner.kinds import checked
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
-from polycorner.motion.mechanics import MechanicalSystem
+from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.placements import onto_equations
 from polycorner.motion.scenes import ContactForce, ContactForces, FrictionTable
@@ -82,7 +82,8 @@ class Trajectory(Checked, Printed):
         Energy lost until each instant, by cause: ``impact`` and the kinds of friction.
     work : mapping from str to (T,) array
         Work done until each instant by the moving ``substrate``, by ``applied`` forces and by
-        ``noise``, and what ``left`` with bodies that left (negative).
+        ``noise``, by the ``drive`` of equations with the time, and what ``left`` with bodies that
+        left (negative).
     events : sequence of Event
         In time.  They are held as arrays; each becomes an object when it is asked for.
     max_penetration : float
@@ -98,6 +99,9 @@ class Trajectory(Checked, Printed):
     steps_per_second : float
         Steps in a second of real time, the first record left out, which includes loading the
         compiled engine; nan if there is no other.
+    last : State or None
+        The last state.  ``simulate(path.system, path.last, t_end, dt)`` goes on bit for bit as one
+        run would have, with accounts of work from zero.  Files do not have it.
     """
 
     system: MechanicalSystem
@@ -121,6 +125,7 @@ class Trajectory(Checked, Printed):
     t_end: float | None = None
     steps_per_second: float = math.nan
     friction: FrictionTable = field(default_factory=FrictionTable)
+    last: State | None = None
 
     def __len__(self) -> int:
         """Return the number of recorded instants."""

@@ -211,7 +211,7 @@ def _at_once(
 
 
 def _outside(certificate: Certificate, formulas: Formulas) -> dict[str, str]:
-    """Return what the certificate's point violates, taken exactly."""
+    """Return what the certificate's point violates, taken exactly, in the best branch."""
     d, m = certificate.problem.polyhedron, certificate.problem.inequalities
     point = Box([ball(x) for x in certificate.point.tolist()])
     values = formulas.values(point, range(m + len(d.equations)))
@@ -219,6 +219,8 @@ def _outside(certificate: Certificate, formulas: Formulas) -> dict[str, str]:
     signs = [-1 if i in broken else 1 for i in range(m)]
     if broken and broken[-1] < m and d.signs_to_pieces(signs):
         return {}  # another branch holds
+    (kept, *_) = d.selections([float(value.mid()) for value in values[:m]])
+    broken = [i for i in broken if i >= m or i in kept]
     return {formulas.names[i]: values[i].str(SHOWN_DIGITS, radius=False) for i in broken}
 
 

@@ -186,7 +186,14 @@ class CornerRegistry:
         return len(self.records) - 1, list(stabiliser)
 
     def figure(self, point: EvaluatedPoint, active: frozenset[int]) -> VertexFigure:
-        """Return the vertex figure of a corner."""
+        """Return the vertex figure of a corner; of one where a function has no slopes, none."""
+        slopes = point.slopes(sorted(active))
+        if not np.isfinite(slopes).all():
+            rows = zip(sorted(active), slopes, strict=True)
+            lost = [g for g, row in rows if not np.isfinite(row).all()]
+            names = ", ".join(self.polyhedron.names[g] for g in lost)
+            note = f"{names} has no derivative at the corner {written_point(point.q)}"
+            return VertexFigure(0, slopes.shape[1], (), (), (note,))
         rank, full = corner_rank(point, active)
         if rank == full:
             found = whole = vertex_figure(point, active)

@@ -466,7 +466,6 @@ WRONG = [
     (lambda: Arrangement(SHIFTS, joints={"a": Slider("A", "B")}), "axis: expected 2 numbers"),
     (lambda: Arrangement(SHIFTS, joints={"a": Hinge("A", "B", axis=[0, 0, 1])}), "axis: "),
     (lambda: Arrangement(SHIFTS, joints={"a": Hinge("A", "B", at=[0, 0, 1])}), "at: expected 2"),
-    (lambda: Arrangement(SHIFTS, joints={"a": Hinge("A", "B", limits=(-4, 4))}), "limits: "),
     (lambda: Arrangement(SHIFTS, joints={"a": Gear("x", "y", 2)}), "first: "),
     (lambda: Arrangement(SHIFTS, joints={"a": Hinge("A", "B")}, period=[9, 9]), "period: "),
     (
@@ -533,3 +532,17 @@ def test_axes_that_turn_have_no_periods_across():
     floor = {"floor": HalfSpace([0, 1], [0, 0])}
     with pytest.raises(ValueError, match=r"^turning: expected 0, or about the only direction"):
         Arrangement({"D": disc(1.0)}, floor, period=[5, None], turning=1.0)
+
+
+def test_gears_of_two_hinges_have_ratios_of_as_many_teeth_as_are_allowed():
+    hinges = {"one": Hinge("world", "A"), "two": Hinge("world", "B", at=[3, 0])}
+
+    def geared(**more):
+        joints = {**hinges, "G": Gear("one", "two", 3 / 1501, **more)}
+        return Arrangement(SHIFTS, joints=joints).polyhedron
+
+    with pytest.raises(ValueError, match=r"ratio: .*denominator of at most 1000"):
+        geared()
+    assert "G" in geared(teeth=2000).equation_names
+    with pytest.raises(ValueError, match="teeth: "):
+        geared(teeth=0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from polycorner import minima, minimise, prove
+from polycorner import minima, minimise, prove, skeleton
 from polycorner.bodies import (
     Arrangement,
     HalfSpace,
@@ -135,3 +135,13 @@ def test_sizes_that_no_body_has_are_refused():
         d.at([1, 1, 5, 5, 0.5])
     with pytest.raises(ValueError, match="at which bodies have sizes; got -1"):
         scaled(PLANE).at([*everywhere(PLANE, np.random.default_rng(1)), -1.0])
+
+
+def test_a_skeleton_says_where_thin_discs_meet_and_have_no_distance_with_slopes():
+    """Discs of the radius 0 meet in a corner of the box, where a distance has no derivative."""
+    d = thinned(Arrangement([disc(0.5)] * 2, box([0, 0], [1, 1])))
+    jammed = minimise(d, d.manifold.symbols[-1], [0.2, 0.3, 0.7, 0.6, 0.4])
+    found = skeleton(d, [jammed.point])
+    assert any("1-2 has no derivative at the corner (" in note for note in found.notes)
+    (lowest,) = [c for c in found.corners if np.allclose(c.point, jammed.point)]
+    assert len(lowest.edges) == 5  # a simple corner in five dimensions

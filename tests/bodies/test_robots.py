@@ -380,6 +380,12 @@ def test_sharp_links_have_unions_and_do_not_move():
     assert robot.polyhedron.contains(robot.point({"one": 0.6}))
     assert not robot.polyhedron.contains(robot.point({"one": 0.4, "two": -0.3}))
     assert robot.overlapping(robot.home) == [("a", "b")]
+    # Walls that links are beyond are named, ones on which they stand are not.
+    shelf, slab = (HalfSpace([0, 0, 1], [0, 0, height]) for height in (-0.25, -0.2))
+    stands, sinks = (replace(robot, walls={"wall": wall}) for wall in (shelf, slab))
+    apart = robot.point({"one": 0.6})
+    assert stands.overlapping(apart) == []
+    assert sinks.overlapping(apart) == [("a", "wall"), ("b", "wall")]
     with pytest.raises(NotImplementedError, match="sharp"):
         robot.system()
 

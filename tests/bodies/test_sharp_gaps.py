@@ -67,12 +67,45 @@ class Contacts:
         entry, rows = self.table + 2 * g, 2 if d == 7 else 1
         return self.called(self.slip.compiled(1), at, entry, rows, at.size)
 
-    def called(self, code, at, first, rows, columns):
+    def called(self, code, at, first, rows, columns, told=None):
+        """What a kernel writes, which is told numbers and may keep some there."""
         f, J = np.zeros(rows), np.zeros((rows, columns))
         call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)(code.point)
         at = np.ascontiguousarray(at, dtype=np.float64).ravel()
-        call(at.ctypes.data, self.numbers[first:].ctypes.data, f.ctypes.data, J.ctypes.data, None)
+        further = None if told is None else told.ctypes.data
+        numbers = self.numbers[first:].ctypes.data
+        call(at.ctypes.data, numbers, f.ctypes.data, J.ctypes.data, further)
         return f, J
+
+
+@pytest.mark.parametrize("d", D)
+def test_what_kernels_leave_out_changes_nothing_else(d):
+    a, system = several(d, 1)
+    contacts, rng, kept = Contacts(system), np.random.default_rng(5), np.zeros(64)
+    parted = []
+    for _ in range(20):
+        q = placed(a, rng, 0.6, 1.6)
+        v = rng.standard_normal(q.shape)
+        values, (gaps, slopes) = contacts.values(q), contacts.gradients(q)
+        size, many = q.size, len(contacts.names)
+        limit, wanted = np.array([np.median(gaps)]), (rng.random(many) < 0.3).astype(float)
+        below = gaps < limit[0]
+        few, rows = contacts.called(contacts.gaps.compiled(1), q, 0, many, size, limit)
+        np.testing.assert_array_equal(few, gaps)
+        np.testing.assert_array_equal(rows[below], slopes[below])
+        assert not rows[~below].any()
+        some, _ = contacts.called(contacts.gaps.compiled(0), q, 0, many, size, wanted)
+        np.testing.assert_array_equal(some[wanted > 0], values[wanted > 0])
+        parted.append(min(values))
+        # Contacts of the same two hulls, and then of others, keep what they have in common.
+        both, code = np.concatenate([q.ravel(), v.ravel()]), contacts.slip.compiled(1)
+        for g in rng.integers(0, many, 4):
+            entry, rates = contacts.table + 2 * g, 2 if d == 3 else 1
+            alone = contacts.called(code, both, entry, rates, both.size)
+            after = contacts.called(code, both, entry, rates, both.size, kept)
+            for one, other in zip(alone, after, strict=True):
+                np.testing.assert_array_equal(one, other)
+    assert min(parted) < 0 < max(parted)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from polycorner.bodies import HalfSpace
 from polycorner.files import MeshOptions, read_urdf
 from polycorner.files.meshes import capsule_around
 
@@ -245,7 +246,8 @@ WRONG = {
         ("", "line {line}: <geometry>: expected one of"),
     ],
     'type="continuous"': [
-        ('type="planar"', r"line {line}: <joint> 'shoulder-1': expected the type .*; got 'planar'"),
+        ('type="ball"', r"line {line}: <joint> 'shoulder-1': expected the type .*; got 'ball'"),
+        ('type="floating"', "joint 'shoulder-1': expected a floating joint from an empty link"),
         ("", "<joint>: expected the attribute type"),
     ],
     '<child link="upper"/>': [
@@ -311,3 +313,46 @@ def test_damaged_files_are_read_or_refused_in_a_sentence(tmp_path_factory, cut, 
     except ValueError as error:
         refusal = str(error)
     assert not refusal or (refusal.startswith("path: arm.urdf") and os.linesep not in refusal)
+
+
+LOOSE = """<robot name="cart">
+  <link name="world"/>
+  <link name="cart">
+    <inertial><mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
+    <collision><geometry><box size="0.4 0.3 0.1"/></geometry></collision>
+  </link>
+  <joint name="drive" type="KIND">
+    <parent link="world"/><child link="cart"/>
+    <origin xyz="1 2 3" rpy="0.3 -0.2 0.5"/><axis xyz="0 1 2"/>
+  </joint>
+</robot>"""
+
+
+def test_a_planar_joint_slides_across_its_axis_and_turns_about_it(tmp_path):
+    path = tmp_path / "cart.urdf"
+    path.write_text(LOOSE.replace("KIND", "planar"))
+    robot = read_urdf(path)
+    assert robot.manifold.names == ("drive_x", "drive_y", "drive")
+    x, y, turn = 0.3, -0.7, 1.1
+    matrix, place = robot.pose(robot.point({"drive_x": x, "drive_y": y, "drive": turn}), "cart")
+    joint = Rotation.from_euler("xyz", [0.3, -0.2, 0.5]).as_matrix()
+    axis = np.array([0, 1, 2]) / math.sqrt(5)
+    about = Rotation.from_rotvec(turn * axis).as_matrix()
+    np.testing.assert_allclose(matrix, joint @ about, atol=1e-12)
+    moved = joint.T @ (place - [1, 2, 3])
+    assert moved @ axis == pytest.approx(0, abs=1e-12)
+    assert np.linalg.norm(moved) == pytest.approx(math.hypot(x, y))
+    far = HalfSpace([0, 0, 1], [0, 0, -9])
+    system = robot.among(walls={"floor": far}).system()
+    kinetic, _ = system.energies(system.state([x, y, turn], [3.0, 4.0, 0.0]))
+    assert kinetic == pytest.approx(2 * 25 / 2)
+
+
+def test_a_floating_joint_below_an_empty_link_is_a_base_that_floats(tmp_path):
+    path = tmp_path / "cart.urdf"
+    path.write_text(LOOSE.replace("KIND", "floating"))
+    robot = read_urdf(path)
+    assert robot.base == "floating"
+    assert robot.root == "cart"
+    assert [*robot.links] == ["cart"]
+    assert robot.manifold.size == 7

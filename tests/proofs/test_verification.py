@@ -294,3 +294,12 @@ def test_a_point_that_is_far_from_any_solution_is_undecided():
     assert p.conditions[UNIQUE] == "undecided"
     assert "scale units from the point" in p.reasons[UNIQUE]
     assert isinstance(p, Proof)
+
+
+def test_a_starting_point_violates_no_branch_that_is_not_its_own():
+    """0.3 as a double is below 3/10, in the one branch; the other is far from holding there."""
+    d = Polyhedron(M, [AnyOf(x - sp.Rational(3, 10), y - 5), y + 1])
+    found = prove(minimise(d, x**2 + y**2, [1.0, 0.2]))
+    assert found.proved
+    assert found.outside.keys() == {"f1"}
+    assert float(found.outside["f1"]) == pytest.approx(float(Fraction(0.3) - Fraction(3, 10)))

@@ -179,6 +179,7 @@ VALUES = {
     "Solid": lambda: files.read_mesh(of.mesh_file()),
     "System": of.system,
     "TorusDisks": of.disks,
+    "Tie": of.tie,
     "Trajectory": of.trajectory,
     "Tutorial": models.Tutorial,
     "UnevenFriction": lambda: dumbbells.UnevenFriction(0.1, 5.0),

@@ -87,6 +87,14 @@ def assembly():
 
 PLACES = {"a": [[0.2, 0.5]], "b": [[0.8, 0.5]]}
 assembled = cache(lambda: assembly().state(PLACES))
+
+
+@cache
+def tie():
+    (x1, y1), (x2, y2) = motion.pair_coordinates(M)
+    return motion.Tie((0, 1), "rod", {"length": (x1 - x2) ** 2 + (y1 - y2) ** 2 - 1})
+
+
 proof = cache(lambda: pc.prove(certificate(), digits=8))
 corner_list = cache(lambda: proofs.corners(square(), box=UNIT))
 stationary_list = cache(lambda: proofs.stationary_points(square(), energy(), box=UNIT))

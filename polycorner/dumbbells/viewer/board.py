@@ -19,7 +19,7 @@ from polycorner.dumbbells.pictures.film import HANDS, TOUCHING, stratum_words
 from polycorner.dumbbells.pictures.movies import chosen_frames
 from polycorner.dumbbells.pictures.placements import relative_coordinates
 from polycorner.dumbbells.pictures.symbols import energy_unit, multiplier_unit
-from polycorner.dumbbells.viewer.sliders import SHAPE, Slider, coordinates, sliders_for
+from polycorner.dumbbells.viewer.sliders import SHAPE, SliderRange, coordinates, sliders_for
 from polycorner.dumbbells.viewer.steepest_descent import STRIDE, Descent, descent
 from polycorner.minimisation import Certificate, Verdict, certify
 from polycorner.polyhedra import LocalType
@@ -39,14 +39,14 @@ class Board(Value):
     pair : DumbbellPair
     q : tuple of six float
         The configuration at full precision; sliders that are not moved do not round it.
-    sliders : mapping from str to Slider
+    sliders : mapping from str to SliderRange
     drum_radius : float
         ``R`` in mm, kept while the pair is in the plane.
     """
 
     pair: DumbbellPair
     q: tuple[float, ...]
-    sliders: Mapping[str, Slider]
+    sliders: Mapping[str, SliderRange]
     drum_radius: float
 
     @classmethod

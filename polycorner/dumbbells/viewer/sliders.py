@@ -34,7 +34,7 @@ class UnknownMessageError(ValueError):
 
 
 @dataclass(frozen=True)
-class Slider:
+class SliderRange:
     """A number that the page may set: name, label, range and step."""
 
     name: str
@@ -44,7 +44,7 @@ class Slider:
     step: float
 
 
-def sliders_for(pair: DumbbellPair, radius: float) -> dict[str, Slider]:
+def sliders_for(pair: DumbbellPair, radius: float) -> dict[str, SliderRange]:
     """Return the sliders of a pair by name, their ranges a few times its own lengths.
 
     Parameters
@@ -57,7 +57,7 @@ def sliders_for(pair: DumbbellPair, radius: float) -> dict[str, Slider]:
     fine = _fine(pair.ball_radius)
     limits = {"lateral": reach, "axial": reach, "heading": 180.0}
     found = [
-        Slider(name, label, -limits[kind], limits[kind], 0.25 if kind == "heading" else fine)
+        SliderRange(name, label, -limits[kind], limits[kind], 0.25 if kind == "heading" else fine)
         for body in "AB"
         for kind, label in PLACES
         for name in (f"{kind}_{body}",)
@@ -69,7 +69,7 @@ def sliders_for(pair: DumbbellPair, radius: float) -> dict[str, Slider]:
         ("rod_radius", min(r / 20, pair.rod_radius), 3 * r),
         ("drum_radius", min(2 * r, radius), 4 * radius),
     ):
-        found.append(Slider(name, shape[name], _round(low, fine), _round(high, fine), fine))
+        found.append(SliderRange(name, shape[name], _round(low, fine), _round(high, fine), fine))
     return {slider.name: slider for slider in found}
 
 
@@ -87,7 +87,7 @@ def coordinates() -> list[str]:
     return [f"{kind}_{body}" for body in "AB" for kind, _ in PLACES]
 
 
-def hello(sliders: Mapping[str, Slider]) -> dict[str, Any]:
+def hello(sliders: Mapping[str, SliderRange]) -> dict[str, Any]:
     """Return the groups of sliders and the buttons of the page, for JSON."""
     groups = [
         [f"Dumbbell {body}", [vars(sliders[f"{kind}_{body}"]) for kind, _ in PLACES]]
@@ -97,7 +97,7 @@ def hello(sliders: Mapping[str, Slider]) -> dict[str, Any]:
     return {"groups": groups, "buttons": [list(button) for button in BUTTONS]}
 
 
-def parsed(message: str, sliders: Mapping[str, Slider]) -> dict[str, float] | str:
+def parsed(message: str, sliders: Mapping[str, SliderRange]) -> dict[str, float] | str:
     """Return slider values, or the name of a button, from a message of the page.
 
     Raises
@@ -118,7 +118,7 @@ def parsed(message: str, sliders: Mapping[str, Slider]) -> dict[str, float] | st
     return {name: _checked(name, value, sliders) for name, value in content.items()}
 
 
-def _checked(name: str, value: object, sliders: Mapping[str, Slider]) -> float:
+def _checked(name: str, value: object, sliders: Mapping[str, SliderRange]) -> float:
     slider = sliders.get(name)
     if slider is None:
         msg = "expected the name of a slider; got another one"

@@ -3,27 +3,42 @@
 from polycorner.motion.engine.arrays import (
     APPLIED_WORK,
     DISSIPATED,
+    DRIVE_WORK,
     NOISE_WORK,
     PAIR_FRICTION,
     PENETRATION,
     SUBSTRATE_WORK,
+    TIE_FRICTION,
+    TIE_GAP,
 )
 from polycorner.motion.engine.contact_list import takes_part
 from polycorner.motion.engine.jit import compiled
 
 
 @compiled
-def book_block(model, body, block, b, sums):
+def book_block(model, body, tie, block, b, sums):
     """Book the work of a block."""
     if not takes_part(body, block, b):
         return
     if block.rows[b] == 0:
+        # What an equation with the time does, at the mean velocity; others do no work.
+        if model.timed and block.bilateral[b] and block.jacobian[b, 0, model.dimension] != 0.0:
+            after = block.after[b, 0] - block.offset[b, 0]
+            mean = 0.5 * (block.before[b, 0] + after) - block.jacobian[b, 0, model.dimension]
+            sums[DRIVE_WORK] += block.impulse[b, 0] * mean
         if not block.bilateral[b]:
             after = block.after[b, 0] - block.offset[b, 0]
             sums[DISSIPATED] -= block.impulse[b, 0] * 0.5 * (block.before[b, 0] + after)
+        elif block.origin[b, 0] == TIE_GAP:
+            sums[DRIVE_WORK] -= block.impulse[b, 0] * tie.rate[block.origin[b, 2]]
         return
-    rubs, f = block.origin[b, 0] == PAIR_FRICTION, block.origin[b, 2]
-    cause = model.pair_causes[f] if rubs else model.friction_causes[f]
+    kind, f = block.origin[b, 0], block.origin[b, 2]
+    if kind == PAIR_FRICTION:
+        cause = model.pair_causes[f]
+    elif kind == TIE_FRICTION:
+        cause = model.tie_causes[f]
+    else:
+        cause = model.friction_causes[f]
     for r in range(block.rows[b]):
         slip = 0.5 * (block.before[b, r] + block.offset[b, r] + block.after[b, r])
         sums[DISSIPATED + cause] -= block.impulse[b, r] * slip

@@ -5,6 +5,7 @@ declarations.  Shapes are written in the letters of :class:`Sizes`; ``*`` is any
 """
 
 from collections.abc import Mapping
+from functools import cache
 from math import prod
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
@@ -14,10 +15,15 @@ from polycorner.motion.engine.sizes import Sizes
 
 # Indices into `counts` and `sums` of the state; the dissipation by cause follows DISSIPATED.
 CONTACTS, STEPS, UNSOLVED, SWEEPS, NEWTON_STEPS, ISLANDS, PARTS = range(7)
-SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, PENETRATION, RESIDUAL, DISSIPATED = range(6)
+SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, DRIVE_WORK, PENETRATION, RESIDUAL, DISSIPATED = range(7)
 
-# Kinds of blocks: contacts with the surroundings, and contacts between bodies.
-OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION = range(4)
+# Kinds of blocks: contacts with the surroundings, and contacts between bodies; limits and equations
+# of ties, and their friction.
+OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION, TIE_GAP, TIE_FRICTION = range(6)
+
+# Of a form of ties: kernels of its rows, slips and forces, or 0; limits, rows, slips; whether its
+# equations follow the time.
+ROW_KERNEL, SLIP_KERNEL, FORCE_KERNEL, LIMITS, ROWS, SLIPS, DRIVEN = range(7)
 
 # Stages of an island between solutions of a step: it has settled, is solved, or has to be again.
 SETTLED, SOLVED, CHANGED = range(3)
@@ -89,6 +95,7 @@ class Model(NamedTuple):
     slip_calls: Annotated[Any, whole("* 6")]
     slip_reads: Annotated[Any, whole("*")]  # coordinates, then velocities
     slip_places: Annotated[Any, whole("*")]
+    slip_contacts: Annotated[Any, whole("*")]  # of each output, among those of its body, or -1
     contact_room: Annotated[Any, whole()]  # C: contacts between bodies for which there is room
     neighbour_room: Annotated[Any, whole()]  # P: pairs of neighbours
     event_room: Annotated[Any, whole()]  # events after which no step begins, nor a part of one
@@ -106,7 +113,8 @@ class Model(NamedTuple):
     vertices: Annotated[Any, real("* 2")]  # of polygons
     first_gap_call: Annotated[Any, whole("A+1")]  # kernels of a body's gaps
     gap_calls: Annotated[Any, whole("* 6")]  # address, sizes in and out; first read, row, parameter
-    gap_reads: Annotated[Any, whole("*")]  # coordinates, call after call
+    gap_reads: Annotated[Any, whole("*")]  # coordinates, call after call; k is the time
+    timed: Annotated[Any, whole()]  # whether equations have the time: then its lane is k
     gap_places: Annotated[Any, whole("*")]  # gap of each output among those of its body, or -1
     first_gap: Annotated[Any, whole("N+1")]  # of each body's gaps, among all
     first_equation: Annotated[Any, whole("N")]  # of them that is an equation, as all further ones
@@ -170,6 +178,31 @@ class Model(NamedTuple):
     crowd_sweeps: Annotated[Any, whole()]  # sweeps over very large islands; 0: these are solved
     threads: Annotated[Any, whole()]
     give_way: Annotated[Any, whole()]  # address: lets other threads run; 0: nothing does
+    ties: Annotated[Any, whole()]  # TJ
+    tie_forms: Annotated[Any, whole("* 7")]  # ROW_KERNEL, ...
+    tie_form: Annotated[Any, whole("TJ")]
+    tie_bodies: Annotated[Any, whole("TJ 2")]  # the second is -1 for the world
+    tie_parameters: Annotated[Any, whole("TJ")]  # first parameter
+    tie_rows: Annotated[Any, whole("TJ+1")]  # first row of each: limits, then equations
+    tie_names: Annotated[Any, whole("TU")]  # of rows: numbers in events, above those of gaps
+    tie_restitution: Annotated[Any, real("TU")]
+    tie_frictions: Annotated[Any, whole("TJ+1")]  # first friction of each
+    tie_slip_start: Annotated[Any, whole("TX")]  # first slip of each friction, in its form
+    tie_slip_rows: Annotated[Any, whole("TX")]
+    tie_pressing: Annotated[Any, whole("TX")]  # row that presses, or -1
+    tie_sets: Annotated[Any, whole("TX 2")]  # static and dynamic set
+    tie_causes: Annotated[Any, whole("TX")]  # cause under which dissipation is booked
+    tie_start: Annotated[Any, whole("N+1")]  # first tie of each body
+    tie_sides: Annotated[Any, whole("*")]  # these: twice the tie, and 1 for its second body
+    components: Annotated[Any, whole()]  # of bodies that hang together by ties
+    component_bodies: Annotated[Any, whole("*")]  # first of each component, and one more
+    component_body: Annotated[Any, whole("*")]
+    component_ties: Annotated[Any, whole("*")]
+    component_tie: Annotated[Any, whole("*")]
+    component_closed: Annotated[Any, whole("*")]  # whether equations may follow from others
+    component_rests: Annotated[Any, whole("*")]  # whether nothing in it depends on the time
+    apart_start: Annotated[Any, whole("N+1")]  # bodies with which each has no contact
+    apart_from: Annotated[Any, whole("*")]
 
 
 class EngineState(NamedTuple):
@@ -202,7 +235,13 @@ class EngineState(NamedTuple):
     elapsed: Annotated[Any, real("N")]  # how much of the step these have done
     watched: Annotated[Any, whole("N")]  # whether the way to the next midpoint was examined
     counts: Annotated[Any, whole("8")]
-    sums: Annotated[Any, real("D+5")]
+    sums: Annotated[Any, real("D+6")]
+    tie_normal: Annotated[Any, real("TU")]  # of ties what `normal`, `touches`, ... are of a body
+    tie_touches: Annotated[Any, whole("TU")]
+    tie_pressed: Annotated[Any, real("TU")]
+    tie_release: Annotated[Any, real("TU")]
+    tie_friction: Annotated[Any, real("TX 2")]
+    tie_sticks: Annotated[Any, whole("TX")]
 
 
 class MannerWork(NamedTuple):
@@ -223,6 +262,8 @@ class MidpointWork(NamedTuple):
     inverse_mass: Annotated[Any, real("N k K")]
     slip_rows: Annotated[Any, real("R K")]  # Jacobian of the slip velocities
     slip_offset: Annotated[Any, real("R")]  # slip velocity at zero velocity
+    slip_known: Annotated[Any, whole("R")]  # whether these were evaluated in this step
+    slip_wanted: Annotated[Any, whole("F")]  # whether those of a friction contact are asked for
     load: Annotated[Any, real("F")]  # known normal impulse
     gap: Annotated[Any, real("U", initial=np.inf)]
     gradient: Annotated[Any, real("U K")]  # of the gaps
@@ -320,6 +361,22 @@ class PairWork(NamedTuple):
     met: Annotated[Any, whole("C")]  # whether a contact of the last step is found in this one
 
 
+class TieWork(NamedTuple):
+    """Ties of bodies in the step."""
+
+    time: Annotated[Any, real("1")]  # of the midpoint
+    gap: Annotated[Any, real("TU")]  # limits and equations at the midpoint
+    rate: Annotated[Any, real("TU")]  # their derivatives by the time
+    gradient: Annotated[Any, real("TU 2*K")]
+    block_of: Annotated[Any, whole("TU")]  # block of each, or -1
+    force: Annotated[Any, real("TJ 2*k")]  # impulses of all forces on both bodies in the step
+    applied: Annotated[Any, real("TJ 2*k")]  # those of the applied forces among them
+    load: Annotated[Any, real("TX")]  # known normal impulse
+    kept: Annotated[Any, whole("TU", initial=1)]  # whether a row does not follow from others
+    basis: Annotated[Any, real("RC")]  # gradients of a component, orthonormal with M^-1
+    answer: Annotated[Any, real("RC")]  # M^-1 times these
+
+
 class BlockWork(NamedTuple):
     """Blocks of the step: what acts on bodies, and how."""
 
@@ -358,7 +415,7 @@ class SearchWork(NamedTuple):
     reversed: Annotated[Any, whole("B")]  # whether slip changed direction in this step
     best: Annotated[Any, real("B 2")]  # impulses of the least residual; Newton direction
     initial: Annotated[Any, real("B 2")]  # impulses before an equilibrium was sought
-    rigid: Annotated[Any, real("B 2")]  # impulses before a continuation
+    rigid: Annotated[Any, real("B 2")]  # impulses before a continuation; bounds before a grip
     loaded: Annotated[Any, real("B 2")]  # impulses for known loads
     carries: Annotated[Any, real("B")]  # whether a block can carry load at rest
     derivative: Annotated[Any, real("B 9")]  # G, for the contact that presses and the block's rows
@@ -418,7 +475,7 @@ class SharedWork(NamedTuple):
     """What threads tell each other."""
 
     found: Annotated[Any, whole("V")]  # contacts that an item finds; from where on it adds them
-    booked: Annotated[Any, real("V D+5")]  # `EngineState.sums` of an item
+    booked: Annotated[Any, real("V D+6")]  # `EngineState.sums` of an item
     finite: Annotated[Any, whole("1")]  # whether velocities and gaps are numbers
     worst: Annotated[Any, real("Z")]  # residuals of parts of an island
     signals: Annotated[Any, whole("32")]  # TICKET, ...
@@ -432,6 +489,8 @@ class ScratchWork(NamedTuple):
 
     values: Annotated[Any, real("W")]  # arguments and results of kernels
     pair_gap: Annotated[Any, real("G")]
+    wanted: Annotated[Any, real("G")]  # which gaps of a pair are wanted; all are zero in between
+    told: Annotated[Any, real("64")]  # to kernels of pairs, and by them to later calls
     way_gap: Annotated[Any, real("6 Y")]  # gaps of a body or of two, at places on the way
     way_rate: Annotated[Any, real("6 Y")]  # their rates
     own_block: Annotated[Any, whole("m")]  # block of each gap of the body at hand, or -1
@@ -459,6 +518,7 @@ class Work(NamedTuple):
     island: IslandWork
     neighbours: NeighbourWork
     pair: PairWork
+    tie: TieWork
     block: BlockWork
     event: EventWork
     search: SearchWork
@@ -481,6 +541,11 @@ class Log(NamedTuple):
 
 
 def declarations(record: Any) -> Mapping[str, Declaration]:
-    """Return the declarations of a record's arrays."""
-    hints = get_type_hints(record, include_extras=True)
+    """Return the declarations of the arrays of a record, or of all records of a class."""
+    return _declared(record if isinstance(record, type) else type(record))
+
+
+@cache
+def _declared(kind: type) -> Mapping[str, Declaration]:
+    hints = get_type_hints(kind, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items()}

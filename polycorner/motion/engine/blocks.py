@@ -11,6 +11,7 @@ from polycorner.motion.engine.arrays import (
     PLAIN,
     SETTLED,
     SMALL,
+    TIE_GAP,
 )
 from polycorner.motion.engine.bounds import (
     acts,
@@ -23,7 +24,8 @@ from polycorner.motion.engine.evaluation import (
     ALONE,
     TOGETHER,
     evaluate_gaps,
-    evaluate_pair_gaps,
+    evaluate_slips,
+    evaluate_wanted_gaps,
 )
 from polycorner.motion.engine.families import coordinates_of, family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
@@ -131,11 +133,20 @@ def new_block(block, b, first, second, rows):
     """Initialise a block without its Jacobian."""
     block.bodies[b, 0], block.bodies[b, 1], block.rows[b] = first, second, rows
     # All that is not set for every kind of block: numbers of blocks change from step to step.
-    block.bilateral[b], block.pressing[b] = ZERO, -1
+    block.bilateral[b], block.pressing[b], block.bound[b] = ZERO, -1, PLAIN
     block.load[b] = 0.0
     for r in range(2):
         block.offset[b, r] = 0.0
         block.impulse[b, r] = 0.0
+
+
+@compiled
+def touch_tied(body, block, b):
+    """Note that the bodies of a tie are touched: velocities are solved for that hold them."""
+    i, j = block.bodies[b, 0], block.bodies[b, 1]
+    body.touched[i] = max(body.touched[i], ALONE)
+    if j >= 0:
+        body.touched[j] = max(body.touched[j], ALONE)
 
 
 @compiled
@@ -167,7 +178,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
             continue
         if not predicted:
             # Only for bodies with a contact: the evaluation costs as much as that of the midpoint.
-            evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
+            evaluate_gaps(model, scratch, i, ahead.q, h, ahead.gap, ahead.gradient)
             predicted = True
         b = count
         count += 1
@@ -180,7 +191,6 @@ def add_body_blocks(model, state, work, i, h, limit, count):
             # nothing.
             if h > STRAIGHT * model.step:
                 change = ahead.gap[g] - gap - h * before
-            block.bound[b] = PLAIN
             block.offset[b, 0] = equation_offset(model, gap, change, h)
             block.bilateral[b], block.bounces[b] = ONE, ZERO
         else:
@@ -196,6 +206,11 @@ def add_body_blocks(model, state, work, i, h, limit, count):
         block.origin[b, 0], block.origin[b, 1], block.origin[b, 2] = OWN_GAP, i, g
         block.impulse[b, 0] = state.normal[g] * share
         finish_block(model, mid, velocity, body, block, b)
+    for f in range(model.first_friction[i], model.first_friction[i + 1]):
+        pressing = model.pressing_gap[f]
+        if pressing >= 0 and block_of[pressing - start] >= 0:
+            mid.slip_wanted[f] = 1
+    evaluate_slips(model, state, mid, scratch, i)
     for f in range(model.first_friction[i], model.first_friction[i + 1]):
         pressing = model.pressing_gap[f]
         presses = block_of[pressing - start] if pressing >= 0 else NONE
@@ -265,7 +280,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
 def add_friction(model, state, work, contact, pressing):
     """Append the blocks of friction at a contact after that which presses; return the count."""
     mid, pair, block = work.mid, work.pair, work.block
-    k, K, values = model.dimension, model.lanes, work.scratch.values
+    K, values = model.lanes, work.scratch.values
     i, j, g = pair.contact[contact, 0], pair.contact[contact, 1], pair.contact[contact, 2]
     family = family_of(model, i, j)
     slip, reads = model.first_pair_slip[family] + g, pair_inputs(model, family)
@@ -286,7 +301,8 @@ def add_friction(model, state, work, contact, pressing):
     v0 = reads + one + two
     j0 = v0 + model.law_start[last_law - 1] + model.law_rows[last_law - 1]
     known = base + 8 * model.pair_slips[slip, 2]
-    call_kernel(model.pair_slips[slip, 0], start, known, start + 8 * v0, start + 8 * j0, start)
+    told = work.scratch.told.ctypes.data
+    call_kernel(model.pair_slips[slip, 0], start, known, start + 8 * v0, start + 8 * j0, told)
     index = pair.before[contact]
     stuck = state.pair_flags[index, 0] if index >= 0 else ZERO
     for f in range(first_law, last_law):
@@ -295,7 +311,7 @@ def add_friction(model, state, work, contact, pressing):
         for r in range(block.rows[b]):
             row = model.law_start[f] + r
             value = values[v0 + row]
-            for c in range(k):  # another block may have stood here, of bodies of other kinds
+            for c in range(K):  # another block may have stood here, of bodies of other kinds
                 block.jacobian[b, r, c] = block.jacobian[b, r, K + c] = 0.0
             for c in range(one + two):
                 slope = values[j0 + row * v0 + reads + c]
@@ -333,6 +349,12 @@ def place_blocks(model, pair, contacts, first):
 
 
 @compiled
+def is_between(pair, contact, first, second):
+    """Return whether a contact is one of two bodies."""
+    return pair.contact[contact, 0] == first and pair.contact[contact, 1] == second
+
+
+@compiled
 def assemble_contacts(model, state, work, h, begin, end, blocks):
     """Assemble the blocks of a range of contacts in their order; return the block count."""
     pair, scratch = work.pair, work.scratch
@@ -340,13 +362,18 @@ def assemble_contacts(model, state, work, h, begin, end, blocks):
     for s in range(begin, end):
         contact = pair.ranked[s]
         # Contacts of one pair follow each other: its gaps are evaluated once.
-        if pair.contact[contact, 0] != first or pair.contact[contact, 1] != second:
+        if not is_between(pair, contact, first, second):
             first, second = pair.contact[contact, 0], pair.contact[contact, 1]
-            evaluate_pair_gaps(model, scratch, first, second, work.ahead.q)
-            family = family_of(model, first, second)
-            n = pair_inputs(model, family)
-            for g in range(model.pair_gaps[family]):
-                scratch.pair_gap[g] = scratch.values[n + g]
+            last = s + 1
+            while last < end and is_between(pair, pair.ranked[last], first, second):
+                last += 1
+            for t in range(s, last):
+                scratch.wanted[pair.contact[pair.ranked[t], 2]] = 1.0
+            evaluate_wanted_gaps(model, scratch, first, second, work.ahead.q)
+            n = pair_inputs(model, family_of(model, first, second))
+            for t in range(s, last):
+                g = pair.contact[pair.ranked[t], 2]
+                scratch.pair_gap[g], scratch.wanted[g] = scratch.values[n + g], 0.0
         blocks = add_pair_blocks(model, state, work, contact, h, blocks)
     return blocks
 
@@ -365,7 +392,9 @@ def renew_blocks(model, state, work, blocks, h):
         if island.stage[island_of(body, island, block, b)] == SETTLED:
             continue
         i, j = block.bodies[b, 0], block.bodies[b, 1]
-        if j >= 0:
+        if block.origin[b, 0] >= TIE_GAP:
+            touch_tied(body, block, b)
+        elif j >= 0:
             body.touched[i] = body.touched[j] = TOGETHER
         elif not block.bilateral[b]:
             body.touched[i] = max(body.touched[i], ALONE)
@@ -374,12 +403,14 @@ def renew_blocks(model, state, work, blocks, h):
             at = row_at(model, b, r)
             block.free[b, r] = row_times(model, block.jacobian, at, velocity.free, i, j)
         if block.rows[b] == 0 and not block.bilateral[b]:
-            least = least_velocity_of(model, state, manner, mid, pair, block, b, former, h)
+            least = least_velocity_of(
+                model, state, manner, mid, pair, work.tie, block, b, former, h
+            )
             # Only a bound that is still that of the velocities before: others were moved on
             # purpose, by curvature or at rest.
             if block.offset[b, 0] == -least:
                 block.offset[b, 0] = -least_velocity_of(
-                    model, state, manner, mid, pair, block, b, block.free[b, 0], h
+                    model, state, manner, mid, pair, work.tie, block, b, block.free[b, 0], h
                 )
         apply_impulses(model, velocity, block, b, block.impulse[b, 0], block.impulse[b, 1])
 

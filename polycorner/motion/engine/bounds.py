@@ -1,6 +1,6 @@
 """Velocity bounds: how fast a gap may close in a step, and which contacts act in one."""
 
-from polycorner.motion.engine.arrays import OWN_GAP
+from polycorner.motion.engine.arrays import OWN_GAP, TIE_GAP
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 
@@ -70,11 +70,13 @@ def equation_offset(model, gap, change, h):
 
 
 @compiled
-def least_velocity_of(model, state, manner, mid, pair, block, b, free, h):
+def least_velocity_of(model, state, manner, mid, pair, tie, block, b, free, h):
     """Return the least normal velocity that the contact of a block allows."""
     i, g = block.origin[b, 1], block.origin[b, 2]
     if block.origin[b, 0] == OWN_GAP:
         gap, closed, bounce = mid.gap[g], state.touches[g] != 0, model.restitution[g]
+    elif block.origin[b, 0] == TIE_GAP:
+        gap, closed, bounce = tie.gap[g], state.tie_touches[g] != 0, model.tie_restitution[g]
     else:
         index = pair.before[i]
         bounce = model.pair_restitution[family_of(model, block.bodies[b, 0], block.bodies[b, 1])]

@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from polycorner.motion.engine.arrays import CONTACTS, OWN_FRICTION, OWN_GAP, PAIR_GAP, PENETRATION
+from polycorner.motion.engine.arrays import (
+    CONTACTS,
+    OWN_FRICTION,
+    OWN_GAP,
+    PAIR_GAP,
+    PENETRATION,
+    TIE_FRICTION,
+    TIE_GAP,
+)
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import bodies_of, key_of
@@ -38,9 +46,13 @@ def store_impulses(model, state, pair, block, begin, end, h):
             state.normal[f] = block.impulse[b, 0] / share
         elif kind == PAIR_GAP:
             pair.impulse[i, 0] = block.impulse[b, 0]
+        elif kind == TIE_GAP:
+            state.tie_normal[f] = block.impulse[b, 0] / share
         for r in range(block.rows[b]):
             if kind == OWN_FRICTION:
                 state.friction[f, r] = block.impulse[b, r] / share
+            elif kind == TIE_FRICTION:
+                state.tie_friction[f, r] = block.impulse[b, r] / share
             else:
                 pair.impulse[i, 1 + model.law_start[f] + r] = block.impulse[b, r]
 
@@ -84,6 +96,8 @@ def observe_block(model, state, work, b, h, time, sums):
         return
     if kind == OWN_FRICTION:
         state.sticks[g] = 1 if sticks(model, body, block, b) else 0
+    elif kind == TIE_FRICTION:
+        state.tie_sticks[g] = 1 if sticks(model, body, block, b) else 0
     # Friction and equations neither open nor close.
     if block.rows[b] > 0 or block.bilateral[b]:
         return
@@ -91,6 +105,9 @@ def observe_block(model, state, work, b, h, time, sums):
     if kind == OWN_GAP:
         gap, was = work.mid.gap[g], state.touches[g] != 0
         pressed, release = state.pressed[g], state.release[g]
+    elif kind == TIE_GAP:
+        gap, was = work.tie.gap[g], state.tie_touches[g] != 0
+        pressed, release = state.tie_pressed[g], state.tie_release[g]
     else:
         pair.block_of[i] = b
         gap, index = pair.gap[i], pair.before[i]
@@ -117,20 +134,36 @@ def observe_block(model, state, work, b, h, time, sums):
         state.release[g] = release
         if share > INSTANT:
             state.pressed[g] = block.impulse[b, 0] / share
+    elif kind == TIE_GAP:
+        state.tie_touches[g], state.tie_release[g] = 1 if out[0] > 0.0 else 0, release
+        if share > INSTANT:
+            state.tie_pressed[g] = block.impulse[b, 0] / share
     else:
         block.origin[b, 3] = 1 if out[0] > 0.0 else 0
         event.release[b] = release
 
 
 @compiled
-def record_contacts(pair, block, event, log, blocks, count):
+def place_of(model, pair, block, b):
+    """Return the bodies, the second may be -1, and the number of the gap of a block, for events.
+
+    The limits and equations of ties have the numbers of their names.
+    """
+    kind, s, g = block.origin[b, 0], block.origin[b, 1], block.origin[b, 2]
+    if kind == OWN_GAP:
+        return s, NONE, g
+    if kind == TIE_GAP:
+        return model.tie_bodies[s, 0], model.tie_bodies[s, 1], model.tie_names[g]
+    return pair.contact[s, 0], pair.contact[s, 1], g
+
+
+@compiled
+def record_contacts(model, pair, block, event, log, blocks, count):
     """Record contacts made, lost and bounced; return the number of events."""
     for b in range(blocks):
         # Block by block afterwards, not by the threads that observed: events stand in one order.
         if event.happened[b] >= 0:
-            i, j, g = block.origin[b, 1], NONE, block.origin[b, 2]
-            if block.origin[b, 0] != OWN_GAP:
-                i, j = pair.contact[block.origin[b, 1], 0], pair.contact[block.origin[b, 1], 1]
+            i, j, g = place_of(model, pair, block, b)
             when, impulse = event.time[b], block.impulse[b, 0]
             count = record(log, count, event.happened[b], i, j, g, when, impulse)
     return count

@@ -3,7 +3,7 @@
 import numpy as np
 
 from polycorner.formulas.compilation import never_inline
-from polycorner.motion.engine.arrays import BENT, CHANGED, OWN_GAP, SETTLED
+from polycorner.motion.engine.arrays import BENT, CHANGED, OWN_GAP, SETTLED, TIE_GAP
 from polycorner.motion.engine.blocks import STRAIGHT
 from polycorner.motion.engine.bounds import equation_offset
 from polycorner.motion.engine.crowds import is_crowd
@@ -12,7 +12,9 @@ from polycorner.motion.engine.families import family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.partition import island_of
+from polycorner.motion.engine.paths import tie_code
 from polycorner.motion.engine.rows import speed_at
+from polycorner.motion.engine.ties import evaluate_tie, row_inputs
 
 MISSED = 1e-12  # scaled gap up to which an equation holds
 
@@ -50,7 +52,7 @@ def correct_island(model, work, root, h):
     """Raise the velocity bounds of an island; return whether any; see above."""
     body, ahead, island = work.body, work.ahead, work.island
     block, scratch = work.block, work.scratch
-    found, first, second = ZERO, NONE, NONE
+    found, first, second, tied = ZERO, NONE, NONE, NONE
     # Curvature closes a gap by the square of the travel; below this speed by too little to matter.
     fast = np.sqrt(0.5 * model.bending) * model.gap_unit / h
     for s in range(island.start[root], island.start[root + 1]):
@@ -61,17 +63,23 @@ def correct_island(model, work, root, h):
             continue
         i, g = block.bodies[b, 0], block.origin[b, 2]
         if block.origin[b, 0] == OWN_GAP:
-            if i != first:
-                evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
-            first, second = i, NONE
+            # After a pair `first` is one of its bodies, whose own gaps are not evaluated here yet.
+            if i != first or second != NONE:
+                evaluate_gaps(model, scratch, i, ahead.q, h, ahead.gap, ahead.gradient)
+            first, second, tied = i, NONE, NONE
             gap, following = work.mid.gap[g], ahead.gap[g]
+        elif block.origin[b, 0] == TIE_GAP:
+            if block.origin[b, 1] != tied:
+                look_at_tie(model, work, block.origin[b, 1], h)
+            first, second, tied = NONE, NONE, block.origin[b, 1]
+            gap, following = work.tie.gap[g], following_of(model, scratch, tied, g)
         else:
             j = block.bodies[b, 1]
             if body.speed[i] + body.speed[j] <= fast:
                 continue
             if i != first or j != second:
                 evaluate_pair_gaps(model, scratch, i, j, ahead.q)
-            first, second = i, j
+            first, second, tied = i, j, NONE
             gap = work.pair.gap[block.origin[b, 1]]
             following = scratch.values[pair_inputs(model, family_of(model, i, j)) + g]
         if block.bilateral[b]:
@@ -88,6 +96,18 @@ def correct_island(model, work, root, h):
             block.bound[b] = BENT
             found = ONE
     return found
+
+
+@compiled
+def look_at_tie(model, work, t, h):
+    """Evaluate a tie at the next midpoint."""
+    evaluate_tie(model, work.scratch, t, work.ahead.q, work.tie.time[0] + h)
+
+
+@compiled
+def following_of(model, scratch, t, row):
+    """Return the value of a row of the tie that was evaluated last."""
+    return scratch.values[row_inputs(model) + row - model.tie_rows[t]]
 
 
 @compiled
@@ -149,9 +169,14 @@ def follow_curvature(model, state, work, blocks, h):
             continue
         i, j, g = block.bodies[b, 0], block.bodies[b, 1], block.origin[b, 2]
         share, away = settled(model, body, i), i != first or j != second
-        if j < 0:
+        if block.origin[b, 0] == TIE_GAP:
+            t, j = block.origin[b, 1], tie_code(block.origin[b, 1])
+            if i != first or j != second:
+                look_at_tie(model, work, t, h)
+            gap, following = work.tie.gap[g], following_of(model, scratch, t, g)
+        elif j < 0:
             if away:
-                evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
+                evaluate_gaps(model, scratch, i, ahead.q, h, ahead.gap, ahead.gradient)
             gap, following = mid.gap[g], ahead.gap[g]
         else:
             if away:

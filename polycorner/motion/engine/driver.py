@@ -1,5 +1,6 @@
 """The engine: bodies in motion, advanced step by step by compiled code."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
@@ -33,7 +34,7 @@ from polycorner.motion.engine.arrays import (
     declarations,
 )
 from polycorner.motion.engine.intermediate import ANY, compiled_advance
-from polycorner.motion.engine.layout import model_of
+from polycorner.motion.engine.layout import model_of, tied_events
 from polycorner.motion.engine.sizes import Sizes
 from polycorner.motion.engine.threads import assisted
 from polycorner.motion.events import EventTable, joined
@@ -101,6 +102,7 @@ class Engine:
         solver: Solver | None = None,
     ) -> None:
         self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
+        self.before = 0  # steps that were done before this run
         self.capacity = max(16, CONTACTS_PER_BODY * bodies.total)
         self._own = _own_contacts(bodies)
         self._check_size()
@@ -110,7 +112,20 @@ class Engine:
         self.motion.rank[:] = self.motion.body_of_rank[:] = np.arange(bodies.total)
         for first, end in zip(self.model.first_equation, self.model.first_gap[1:], strict=True):
             self.motion.touches[first:end] = 1
+        self._start_ties()
         self._allocate()
+
+    def _start_ties(self) -> None:
+        """Let equations of ties touch, and friction of ties stick where its slip is zero."""
+        model, motion, ties = self.model, self.motion, self.bodies.ties
+        for t, form in enumerate(ties.form):
+            limits = model.tie_rows[t] + ties.forms[form].limits
+            motion.tie_touches[limits : model.tie_rows[t + 1]] = 1
+        for which, (slips,) in ties.evaluate("slips", motion.q, motion.v, self.start):
+            for t, row in zip(which, slips, strict=True):
+                for x in range(model.tie_frictions[t], model.tie_frictions[t + 1]):
+                    begin = model.tie_slip_start[x]
+                    motion.tie_sticks[x] = not row[begin : begin + model.tie_slip_rows[x]].any()
 
     @property
     def _sizes(self) -> Sizes:
@@ -129,6 +144,9 @@ class Engine:
         """Allocate the workspace, and tell compiled code where everything is."""
         sizes = self._sizes
         self.work, self.log = workspace(sizes), allocate(Log, sizes)
+        if self.model.timed:
+            for velocity in self.work.velocity:
+                velocity[:, sizes.k] = 1.0  # of the time
         self.model = self.model._replace(contact_room=sizes.C, neighbour_room=sizes.P)
         others = range(self.model.threads - 1)
         self._works = [self.work, *(own_workspace(self.work, sizes) for _ in others)]
@@ -142,19 +160,19 @@ class Engine:
     @property
     def time(self) -> float:
         """The time of the present state."""
-        return self.start + self.steps * self.dt
+        return self.start + (self.before + self.steps) * self.dt
 
     @property
     def steps(self) -> int:
-        """The number of steps done since the start."""
-        return int(self.motion.counts[STEPS])
+        """The number of steps done in this run."""
+        return int(self.motion.counts[STEPS]) - self.before
 
     @property
     def effort(self) -> Effort:
         """The cost so far."""
         counts, sums = self.motion.counts.tolist(), self.motion.sums
         return Effort(
-            steps=counts[STEPS],
+            steps=self.steps,
             islands=counts[ISLANDS],
             sweeps=counts[SWEEPS],
             newton_steps=counts[NEWTON_STEPS],
@@ -224,6 +242,11 @@ class Engine:
             for name, gap in zip(body.contacts, gaps, strict=True):
                 if np.isnan(gap):
                     return f"the gap {name!r}{where} is not a number"
+        for row in np.flatnonzero(np.isnan(self.work.tie.gap)):
+            return f"{bodies.ties.names[row]!r} is not a number at t = {self.time:.6g}"
+        for t in np.flatnonzero(~np.isfinite(self.work.tie.force).all(axis=1)):
+            tied = " and ".join(bodies.called(i) for i in bodies.ties.bodies[t] if i >= 0)
+            return f"a force of a tie of {tied} at t = {self.time:.6g} is not finite"
         return f"the velocities after t = {self.time:.6g}, dt = {self.dt:.6g} later, are not finite"
 
     def _parameters(self, kind: int) -> Array:
@@ -234,8 +257,10 @@ class Engine:
 
     def _read(self, count: int) -> EventTable:
         whole, numbers = self.log.entries[:count].copy(), self.log.numbers[:count].copy()
-        of_pair = (whole[:, 2] >= 0) & (whole[:, 3] >= 0)
-        own = (whole[:, 2] < 0) & (whole[:, 3] >= 0)
+        first = tied_events(self.bodies)
+        gaps = (whole[:, 3] >= 0) & (whole[:, 3] < first)
+        of_pair, own = gaps & (whole[:, 2] >= 0), gaps & (whole[:, 2] < 0)
+        whole[whole[:, 3] >= first, 3] -= first
         whole[own, 3] = self._own[whole[own, 3]]
         i, j, g = whole[of_pair, 1:].T
         whole[of_pair, 3] = self._between(i, j, g)
@@ -249,17 +274,27 @@ class Engine:
     def load(self, arrays: dict[str, Any]) -> None:
         """Continue, bit for bit, from arrays saved before, with at least as much room."""
         order = np.arange(self.bodies.total)  # that of states saved before bodies had ranks
-        arrays = {"rank": order, "body_of_rank": order, **arrays}
+        untied: dict[str, Any] = {
+            name: [] for name in EngineState._fields if name.startswith("tie_")
+        }
+        arrays = {"rank": order, "body_of_rank": order, **untied, **arrays}
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
         self.bodies.check_places(arrays["q"], arrays["v"], self.dt)
         self.motion = restored(EngineState, self._sizes, arrays)
         self._allocate()
 
+    def resume(self, arrays: Mapping[str, Any]) -> None:
+        """Go on from the end of another run, with accounts of its own."""
+        kept = np.zeros_like(arrays["counts"])
+        kept[[CONTACTS, STEPS]] = arrays["counts"][[CONTACTS, STEPS]]
+        self.load({**arrays, "counts": kept, "sums": np.zeros_like(arrays["sums"])})
+        self.before = int(kept[STEPS])
+
     def energies(self) -> tuple[float, float]:
         """Return kinetic and potential energy of the bodies that have not left."""
         total = self._energies()[self.motion.alive != 0].sum(axis=0)
-        return float(total[0]), float(total[1])
+        return float(total[0]), float(total[1]) + self.bodies.ties.energy(self.motion.q)
 
     def energy_of(self, body: int) -> float:
         """Return the energy of one body, also when it has left."""
@@ -293,9 +328,16 @@ class Engine:
         forces = (motion.pair_impulse[pairs, 0] / h).tolist()
         which = self._between(first, second, gaps).tolist()
         bodies = zip(first.tolist(), second.tolist(), strict=True)
-        return own + [
-            (two, names[c], force) for two, c, force in zip(bodies, which, forces, strict=True)
-        ]
+        between = zip(bodies, which, forces, strict=True)
+        return [*own, *((two, names[c], force) for two, c, force in between), *self._tied()]
+
+    def _tied(self) -> Iterator[tuple[tuple[int, ...], str, float]]:
+        """Yield limits that touch, and equations, of ties."""
+        ties, motion, starts = self.bodies.ties, self.motion, self.model.tie_rows
+        for row in np.flatnonzero(motion.tie_touches):
+            i, j = ties.bodies[int(np.searchsorted(starts, row, side="right")) - 1]
+            force = float(motion.tie_normal[row]) / self.dt
+            yield ((i,) if j < 0 else (i, j)), ties.names[row], force
 
     def pair_of(self, s: int) -> tuple[tuple[int, int], int]:
         """Return the two bodies of a contact in the list, the lower number first, and the gap."""

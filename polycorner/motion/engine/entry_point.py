@@ -61,6 +61,7 @@ def readers(dimension: int) -> list[Any]:
     island = read(parts["island"])
     neighbours = read(parts["neighbours"])
     pair = read(parts["pair"])
+    tie = read(parts["tie"])
     block = read(parts["block"])
     event = read(parts["event"])
     search = read(parts["search"])
@@ -84,6 +85,7 @@ def readers(dimension: int) -> list[Any]:
             island(at.island),
             neighbours(at.neighbours),
             pair(at.pair),
+            tie(at.tie),
             block(at.block),
             event(at.event),
             search(at.search),

@@ -5,8 +5,9 @@ import numpy as np
 from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import CHANGED, SETTLED
 from polycorner.motion.engine.families import coordinates_of, family_of, kind_of, pair_inputs
-from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.jit import ZERO, compiled
 from polycorner.motion.engine.linear_algebra import add_square, invert, solve_spd
+from polycorner.motion.engine.ties import add_tie_forces, tie_is_number, update_tie_forces
 
 # How a body is touched: by its surroundings only, or by other bodies as well.
 ALONE, TOGETHER = range(1, 3)
@@ -99,8 +100,8 @@ def random_impulse(model, i, c, h, time, index):
 @compiled
 def evaluate_body(model, state, mid, scratch, i, h, time, index):
     """Evaluate forces, loads, slips and gaps of a body at the midpoint of the step."""
-    k, kind, values = model.dimension, kind_of(model, i), scratch.values
-    for c in range(k):
+    kind = kind_of(model, i)
+    for c in range(model.dimension):
         mid.q[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
         mid.kick[i, c] = 0.0
         if model.kicks[kind, c] > 0.0:
@@ -108,6 +109,13 @@ def evaluate_body(model, state, mid, scratch, i, h, time, index):
     # Before forces are evaluated, since these depend on the midpoint.
     if model.first_equation[i] < model.first_gap[i + 1]:
         approach_equations(model, mid, scratch, i)
+    evaluate_place(model, state, mid, scratch, i, h, time)
+
+
+@compiled
+def evaluate_place(model, state, mid, scratch, i, h, time):
+    """Evaluate forces, loads, slips and gaps of a body where its midpoint is."""
+    kind, values = kind_of(model, i), scratch.values
     at = evaluate_forces(model, mid, scratch, i, state.v, h, True)
     if model.chatter > 0.0:
         when = np.int64(np.floor(time / model.correlation_time))
@@ -122,13 +130,46 @@ def evaluate_body(model, state, mid, scratch, i, h, time, index):
             if model.load_sources[f, j]:
                 load += values[at + j]
         mid.load[f] = max(0.0, h * load)
+    begin_slips(model, state, mid, i)
     evaluate_slips(model, state, mid, scratch, i)
-    evaluate_gaps(model, scratch, i, mid.q, mid.gap, mid.gradient)
+    evaluate_gaps(model, scratch, i, mid.q, 0.0, mid.gap, mid.gradient)
+
+
+@compiled
+def begin_slips(model, state, mid, i):
+    """Ask for the slips with which rest is proved; others wait until their contacts have blocks."""
+    first, last = model.first_friction[i], model.first_friction[i + 1]
+    for r in range(model.slip_start[first], model.slip_start[last]):
+        mid.slip_known[r] = 0
+    for f in range(first, last):
+        g = model.pressing_gap[f]
+        loaded = g < 0 or g >= model.first_equation[i] or state.normal[g] != 0.0
+        rubs = state.friction[f, 0] != 0.0 or state.friction[f, 1] != 0.0
+        mid.slip_wanted[f] = 1 if loaded or rubs else 0
+
+
+@compiled
+def asks_for_slips(model, mid, i, w0, m):
+    """Return whether a kernel has slips of a body that are asked for and not yet known."""
+    first = model.first_friction[i]
+    row = model.slip_start[first]
+    for o in range(w0, w0 + m):
+        r = model.slip_places[o]
+        if (
+            r >= 0
+            and mid.slip_wanted[first + model.slip_contacts[o]]
+            and not mid.slip_known[row + r]
+        ):
+            return True
+    return False
 
 
 @compiled
 def evaluate_slips(model, state, mid, scratch, i):
-    """Evaluate the slips of a body at the midpoint: derivatives by velocities, and what is left."""
+    """Evaluate slips of a body at the midpoint: derivatives by velocities, and what is left.
+
+    Kernels are called for those that are asked for.
+    """
     k, values = model.dimension, scratch.values
     start, base = values.ctypes.data, model.parameters.ctypes.data
     kind, first = kind_of(model, i), model.slip_start[model.first_friction[i]]
@@ -139,6 +180,8 @@ def evaluate_slips(model, state, mid, scratch, i):
             model.slip_calls[call, 2],
         )
         r0, w0, p0 = model.slip_calls[call, 3], model.slip_calls[call, 4], model.slip_calls[call, 5]
+        if not asks_for_slips(model, mid, i, w0, m):
+            continue
         for a in range(n):
             c = model.slip_reads[r0 + a]
             values[a] = mid.q[i, c] if c < k else state.v[i, c - k]
@@ -149,6 +192,7 @@ def evaluate_slips(model, state, mid, scratch, i):
             if model.slip_places[w0 + o] < 0:
                 continue
             r = first + model.slip_places[w0 + o]
+            mid.slip_known[r] = 1
             value = values[n + o]
             size = abs(value)
             for c in range(k):
@@ -176,7 +220,7 @@ def approach_equations(model, mid, scratch, i):
     kind, A, x = kind_of(model, i), scratch.matrix, scratch.vector
     k, units = coordinates_of(model, i), model.units[kind]
     for _ in range(MOST_APPROACHES):
-        evaluate_gaps(model, scratch, i, mid.q, mid.gap, mid.gradient)
+        evaluate_gaps(model, scratch, i, mid.q, 0.0, mid.gap, mid.gradient)
         worst = 0.0
         for c in range(k):
             x[c] = 0.0
@@ -218,6 +262,8 @@ def update_forces(model, state, work, h):
     """
     mid, velocity, body, island = work.mid, work.velocity, work.body, work.island
     k = model.dimension
+    if model.ties > 0:
+        update_tie_forces(model, state, work, h)
     for i in range(model.bodies):
         root = island.parent[i]
         if not (state.alive[i] and body.awake[i]) or island.stage[root] == SETTLED:
@@ -226,6 +272,8 @@ def update_forces(model, state, work, h):
             body.v_mean[i, c] = 0.5 * (state.v[i, c] + velocity.new[i, c])
             body.former_force[i, c] = mid.force[i, c]
         evaluate_forces(model, mid, work.scratch, i, body.v_mean, h, False)
+        if model.ties > 0:
+            add_tie_forces(model, mid, work.tie, i)
         change, speed = 0.0, 0.0
         for c in range(k):
             value = 0.0
@@ -244,46 +292,62 @@ def update_forces(model, state, work, h):
 
 
 @compiled
-def evaluate_gaps(model, scratch, i, q, gap, gradient):
-    """Evaluate the gaps between a body and its surroundings, and their gradients."""
+def evaluate_gaps(model, scratch, i, q, later, gap, gradient):
+    """Evaluate the gaps between a body and its surroundings, and their gradients.
+
+    Equations with the time are those ``later`` than the midpoint by so much.  Their derivative by
+    it stands in the lane after the coordinates, where all velocities are one.
+    """
     values = scratch.values
     start, base = values.ctypes.data, model.parameters.ctypes.data
-    kind, first = kind_of(model, i), model.first_gap[i]
+    kind, first, now = kind_of(model, i), model.first_gap[i], 0.0
+    if model.timed and model.time_parameter[kind] >= 0:
+        now = model.parameters[model.time_parameter[kind]] + later
     for call in range(model.first_gap_call[kind], model.first_gap_call[kind + 1]):
         address, n, m = model.gap_calls[call, 0], model.gap_calls[call, 1], model.gap_calls[call, 2]
         r0, w0, p0 = model.gap_calls[call, 3], model.gap_calls[call, 4], model.gap_calls[call, 5]
         for a in range(n):
-            values[a] = q[i, model.gap_reads[r0 + a]]
+            c = model.gap_reads[r0 + a]
+            values[a] = q[i, c] if c < model.dimension else now
         j0 = n + m
         call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
         for o in range(m):
             if model.gap_places[w0 + o] >= 0:
                 g = first + model.gap_places[w0 + o]
                 gap[g] = values[n + o]
-                for c in range(model.dimension):
+                for c in range(model.dimension + model.timed):
                     gradient[g, c] = 0.0
                 for a in range(n):
                     gradient[g, model.gap_reads[r0 + a]] += values[j0 + o * n + a]
 
 
 @compiled
-def evaluate_pair(model, scratch, a, b, q):
-    """Evaluate the gaps of a pair of bodies and their gradients.
+def evaluate_pair(model, scratch, a, b, q, limit):
+    """Evaluate the gaps of a pair of bodies, and the gradients of those below a limit.
 
     The scratch array gets the coordinates that the gaps read, the gaps, and their gradients.
     """
-    call_pair_kernel(model, scratch, model.pair_kernel[family_of(model, a, b)], a, b, q)
+    scratch.told[0] = limit
+    kernel = model.pair_kernel[family_of(model, a, b)]
+    call_pair_kernel(model, scratch, kernel, a, b, q, scratch.told.ctypes.data)
 
 
 @compiled
 def evaluate_pair_gaps(model, scratch, a, b, q):
     """Evaluate the gaps of a pair of bodies alone, where :func:`evaluate_pair` leaves them."""
-    call_pair_kernel(model, scratch, model.pair_values[family_of(model, a, b)], a, b, q)
+    call_pair_kernel(model, scratch, model.pair_values[family_of(model, a, b)], a, b, q, ZERO)
 
 
 @compiled
-def call_pair_kernel(model, scratch, kernel, a, b, q):
-    """Call a kernel for two bodies."""
+def evaluate_wanted_gaps(model, scratch, a, b, q):
+    """Evaluate the gaps of a pair of bodies that are not zero in ``scratch.wanted``, or more."""
+    kernel, wanted = model.pair_values[family_of(model, a, b)], scratch.wanted.ctypes.data
+    call_pair_kernel(model, scratch, kernel, a, b, q, wanted)
+
+
+@compiled
+def call_pair_kernel(model, scratch, kernel, a, b, q, told):
+    """Call a kernel for two bodies; those that are no formulas are told something."""
     values, family = scratch.values, family_of(model, a, b)
     first, n, m = model.first_read[family], pair_inputs(model, family), model.pair_gaps[family]
     start, base = values.ctypes.data, model.parameters.ctypes.data
@@ -291,7 +355,7 @@ def call_pair_kernel(model, scratch, kernel, a, b, q):
         body = a if model.pair_reads[first + r, 0] == 0 else b
         values[r] = q[body, model.pair_reads[first + r, 1]]
     j0, p0 = n + m, model.pair_parameters[family]
-    call_kernel(kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
+    call_kernel(kernel, start, base + 8 * p0, start + 8 * n, start + 8 * j0, told)
 
 
 @compiled
@@ -329,5 +393,7 @@ def start_body(model, state, work, i):
     for g in range(model.first_gap[i], model.first_gap[i + 1]):
         # An infinite gap is far; one that is not a number would pass all comparisons as open.
         finite = finite and not np.isnan(mid.gap[g])
+    if model.ties > 0:
+        finite = finite and tie_is_number(model, work.tie, i)
     if not finite:
         work.shared.finite[0] = 0

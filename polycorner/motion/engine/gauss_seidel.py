@@ -109,7 +109,7 @@ def residual(model, velocity, block, search, scratch, first, last, compliance):
 
 @compiled
 def copy_impulses(block, first, last, source, target):
-    """Copy the impulses of an island."""
+    """Copy impulses, or offsets, of the blocks of an island."""
     for s in range(first, last):
         b = block.order[s]
         for r in range(2):

@@ -8,14 +8,15 @@ from polycorner.motion.engine.arrays import (
     LAST,
     NEWTON_STEPS,
     OWN_FRICTION,
-    PAIR_FRICTION,
     SMALL,
     SWEEPS,
+    TIE_FRICTION,
+    TIE_GAP,
 )
 from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.families import coordinates_of, kind_of
-from polycorner.motion.engine.gauss_seidel import relax_block, residual
+from polycorner.motion.engine.gauss_seidel import copy_impulses, relax_block, residual
 from polycorner.motion.engine.island_matrix import number_bodies
 from polycorner.motion.engine.jit import ONE, compiled
 from polycorner.motion.engine.linear_algebra import add_square, solve_spd
@@ -65,7 +66,7 @@ def iterate(model, state, work, first, last, speed, again, may_rest):
     rounds, done, former = 0, 0, np.inf
     while rounds == 0 or (worst > goal and done < model.sweeps):
         if rounds == 1:
-            leave_errors(block, first, last)
+            leave_errors(model, block, first, last, speed)
         if not direct or rounds > 0:
             for _ in range(FIRST_SWEEPS if rounds == 0 else ROUND_SWEEPS):
                 worst = 0.0
@@ -166,11 +167,20 @@ def move_forward(block, search, s, acting):
 
 
 @compiled
-def leave_errors(block, first, last):
-    """Let small errors of closed gaps be."""
+def leave_errors(model, block, first, last, speed):
+    """Let small errors of closed gaps be, and what ties in closed loops ask too much.
+
+    Equations that follow from others agree with them up to curvature only: forces that are to
+    make up for the difference would grow without bound.  Curvature is corrected afterwards.
+    """
     for s in range(first, last):
         b = block.order[s]
-        if block.rows[b] == 0 and block.bound[b] == SMALL:
+        if block.rows[b] > 0:
+            continue
+        if block.bilateral[b]:
+            if block.origin[b, 0] == TIE_GAP and abs(block.after[b, 0]) < model.dependent * speed:
+                block.offset[b, 0] -= block.after[b, 0]
+        elif block.bound[b] == SMALL:
             block.offset[b, 0] = 0.0
 
 
@@ -193,7 +203,12 @@ def switch_reversed_slips(model, state, block, search, first, last):
         if along < 0.0:
             search.reversed[b] = 1
             kind, f = block.origin[b, 0], block.origin[b, 2]
-            shape = model.friction_sets[f, 0] if kind == OWN_FRICTION else model.pair_sets[f, 0]
+            if kind == OWN_FRICTION:
+                shape = model.friction_sets[f, 0]
+            elif kind == TIE_FRICTION:
+                shape = model.tie_sets[f, 0]
+            else:
+                shape = model.pair_sets[f, 0]
             if shape != block.set[b]:
                 block.set[b] = shape
                 found = True
@@ -290,13 +305,19 @@ def keeps_grip(model, state, work, first, last, speed, solved):
     Then the impulses that hold it, and its velocity, are the solution.  Where loads depend on
     friction, slip can solve a step that sticking solves as well: what stuck goes on to stick.
     """
-    velocity, block, scratch = work.velocity, work.block, work.scratch
+    velocity, block, search = work.velocity, work.block, work.search
     i = block.bodies[block.order[first], 0]
-    return (
+    if not (
         loses_grip(model, state, work.body, block, first, last, i, solved)
-        and find_grip_velocity(model, velocity, block, scratch, first, last, i)
-        and find_equilibrium(model, state, work, first, last, speed)
-    )
+        and find_grip_velocity(model, velocity, block, work.scratch, first, last, i)
+    ):
+        return False
+    copy_impulses(block, first, last, block.offset, search.rigid)
+    if find_equilibrium(model, state, work, first, last, speed):
+        return True
+    # It moves bounds to where rest would have them; the solution at hand is of those before.
+    copy_impulses(block, first, last, search.rigid, block.offset)
+    return False
 
 
 @compiled
@@ -310,7 +331,7 @@ def loses_grip(model, state, body, block, first, last, i, solved):
     for s in range(first, last):
         b = block.order[s]
         # Several bodies may stick and slip in many ways; the question is only asked of one.
-        if block.bodies[b, 1] >= 0 or block.origin[b, 0] == PAIR_FRICTION:
+        if block.bodies[b, 1] >= 0 or block.origin[b, 0] > OWN_FRICTION:
             return False
         if block.origin[b, 0] != OWN_FRICTION or load_on(block, b) <= 0.0:
             continue
@@ -339,10 +360,12 @@ def find_grip_velocity(model, velocity, block, scratch, first, last, i):
         if not loaded:
             continue
         for r in range(max(1, block.rows[b])):
-            row = block.jacobian[b, r, :k]
+            row, offset = block.jacobian[b, r, :k], block.offset[b, r]
+            if model.timed:
+                offset += block.jacobian[b, r, model.dimension]
             add_square(A, row, 1.0, k)
             for c in range(k):
-                x[c] -= block.offset[b, r] * row[c]
+                x[c] -= offset * row[c]
     if not solve_spd(A, x, k):
         return False
     for c in range(k):

@@ -35,6 +35,12 @@ def model_of(
     options, sets, parameters = solver.options, _Sets(), list[float]()
     dependence = [_dependence(kind.body) for kind in bodies.kinds]
     laws = [kind.body.formulation for kind in bodies.kinds]
+    if solver.crowd_sweeps and bodies.ties.bodies:
+        msg = (
+            "solver: expected crowd_sweeps=0 for bodies with ties, which few sweeps would leave "
+            f"open; got {solver.crowd_sweeps}"
+        )
+        raise NotImplementedError(msg)
     if solver.crowd_sweeps and any(
         kind.body.equations and not known["constant_mass"]
         for kind, known in zip(bodies.kinds, dependence, strict=True)
@@ -66,11 +72,13 @@ def model_of(
         "exit_coordinate": [kind.exit_coordinate for kind in bodies.kinds],
         "exit_limit": [kind.exit_limit for kind in bodies.kinds],
         "constant_mass": [known["constant_mass"] for known in dependence],
-        "follows_velocity": any(known["follows_velocity"] for known in dependence),
+        "follows_velocity": any(known["follows_velocity"] for known in dependence)
+        or any(form.damped for form in bodies.ties.forms),
         "units": units,
         "kicks": kicks,
         "period": (*bodies.period, np.inf)[:3],
         "substrate_speed": bodies.substrate_speed,
+        "timed": any(kind.body.timed for kind in bodies.kinds),
         "equations": sum(kind.count * kind.body.equations for kind in bodies.kinds),
         "gap_unit": bodies.gap_unit,
         "chatter": noise.chatter,
@@ -83,7 +91,9 @@ def model_of(
         "crowd_sweeps": solver.crowd_sweeps,
         "threads": solver.threads,
         "give_way": address_of_yield(),
-        "may_rest": any(_may_rest(kind) for kind in bodies.kinds),
+        # What is driven never rests for good, and a velocity of rest would be one of an instant.
+        "may_rest": (any(_may_rest(kind) for kind in bodies.kinds) or bool(bodies.ties.bodies))
+        and not any(kind.body.timed for kind in bodies.kinds),
         "follows_time": any(
             law.time_parameter >= 0 and not kind.body.slow_signals
             for kind, law in zip(bodies.kinds, laws, strict=True)
@@ -96,6 +106,8 @@ def model_of(
         **_surroundings(bodies, sets, sizes),
         **_kernels(bodies, parameters, sizes.k),
         **_pairs(bodies, parameters, sets),
+        **_ties(bodies, parameters, sets),
+        **_components(bodies, noise),
         **sets.values(),
     }
     return filled(Model, sizes, {**values, "parameters": [*parameters, 0.0]})
@@ -180,7 +192,7 @@ def _kernels(bodies: MovingBodies, parameters: list[float], width: int) -> dict[
         name: []
         for name in ("force_parameters", "time_parameter", "signal_kernel", "signal_parameters")
     }
-    slips, gaps = _Calls("slip"), _Calls("gap")
+    slips, gaps, rubbing = _Calls("slip"), _Calls("gap"), list[int]()
     for kind in bodies.kinds:
         body, law, first = kind.body, kind.body.formulation, len(parameters)
         parameters += body.parameters.tolist()
@@ -196,7 +208,9 @@ def _kernels(bodies: MovingBodies, parameters: list[float], width: int) -> dict[
         places = [c if c < kind.dimension else c + shift for c in range(2 * kind.dimension)]
         slips.add(law.slip_calls, parameters, places, law.slip, first)
         gaps.add(body.gaps, parameters, places)
-    return {**found, **slips.values(), **gaps.values()}
+        of_row = [c for c, contact in enumerate(body.friction) for _ in range(contact.rows)]
+        rubbing += [of_row[r] if r >= 0 else -1 for r in slips.places[len(rubbing) :]]
+    return {**found, **slips.values(), **gaps.values(), "slip_contacts": [*rubbing, 0]}
 
 
 class _Calls:
@@ -282,6 +296,85 @@ def _pairs(bodies: MovingBodies, parameters: list[float], sets: "_Sets") -> dict
         "pair_restitution": [one.restitution for one in families],
         "pair_reach": [one.reach for one in families],
         "reach": max((one.reach for one in families), default=0.0),
+    }
+
+
+def tied_events(bodies: MovingBodies) -> int:
+    """Return the number from which on numbers of gaps in events are names, of rows of ties."""
+    own = [kind.count * len(kind.body.contacts) for kind in bodies.kinds]
+    return max(sum(own), *(len(one.gaps.names) for one in bodies.families.values()), 0)
+
+
+def _ties(bodies: MovingBodies, parameters: list[float], sets: "_Sets") -> dict[str, Any]:
+    """Return the entries of the ties; their parameters are appended."""
+    ties, friction = bodies.ties, bodies.ties.friction
+    forms = []
+    for form in ties.forms:
+        kernels = [form.rows.kernel.compiled(1).point if form.rows.names else 0]
+        kernels += [form.slips.kernel.compiled(1).point if form.slips else 0]
+        kernels += [form.forces.kernel.compiled(0).point if form.forces else 0]
+        slips = len(form.slips.names) if form.slips else 0
+        forms.append([*kernels, form.limits, len(form.rows.names), slips, form.driven])
+    first = []
+    for values in ties.parameters:
+        first.append(len(parameters))
+        parameters += values
+    own = [ties.forms[form].friction for form in ties.form]
+    starts = [np.cumsum([0, *(f.rows for f in some)])[:-1] for some in own]
+    place = {name: tied_events(bodies) + n for n, name in enumerate(bodies.contact_names)}
+    return {
+        "ties": len(ties.bodies),
+        "tie_forms": forms,
+        "tie_form": ties.form,
+        "tie_bodies": ties.bodies,
+        "tie_parameters": first,
+        "tie_rows": ties.row_starts,
+        "tie_names": [place[name] for name in ties.names],
+        "tie_restitution": ties.restitution,
+        "tie_frictions": np.cumsum([0, *map(len, own)]),
+        "tie_slip_start": [start for some in starts for start in some],
+        "tie_slip_rows": [f.rows for f in friction],
+        "tie_pressing": [f.pressing for f in friction],
+        "tie_sets": [[sets.add(f.static), sets.add(f.dynamic)] for f in friction],
+        "tie_causes": [bodies.causes.index(f.cause) for f in friction],
+    }
+
+
+def _components(bodies: MovingBodies, noise: Noise) -> dict[str, Any]:
+    """Return who is tied to whom: ties of each body, components, and bodies without contacts."""
+    ties, N = bodies.ties, bodies.total
+    sides: list[list[int]] = [[] for _ in range(N)]
+    away: list[list[int]] = [[] for _ in range(N)]
+    for t, pair in enumerate(ties.bodies):
+        for side, i in enumerate(pair):
+            if i >= 0:
+                sides[i].append(2 * t + side)
+    for i, j in ties.apart:
+        away[i].append(j)
+        away[j].append(i)
+    found = ties.components
+    still = [
+        kind.body.formulation.time_parameter < 0
+        and not any(noise.kicks.get(name, 0.0) for name in kind.body.formulation.coordinates)
+        and not (noise.chatter and kind.body.formulation.loads)
+        for kind in bodies.kinds
+    ]
+    return {
+        "tie_start": np.cumsum([0, *map(len, sides)]),
+        "tie_sides": [code for some in sides for code in some],
+        "components": len(found),
+        "component_bodies": np.cumsum([0, *(len(c.bodies) for c in found)]),
+        "component_body": [i for c in found for i in c.bodies],
+        "component_ties": np.cumsum([0, *(len(c.ties) for c in found)]),
+        "component_tie": [t for c in found for t in c.ties],
+        "component_closed": [c.closed for c in found],
+        "component_rests": [
+            all(still[bodies.kind_of[i]] for i in c.bodies)
+            and not any(ties.forms[ties.form[t]].timed for t in c.ties)
+            for c in found
+        ],
+        "apart_start": np.cumsum([0, *map(len, away)]),
+        "apart_from": [j for some in away for j in sorted(some)],
     }
 
 

@@ -11,7 +11,7 @@ there is always an impact, and the parts of a step, each solved for the whole he
 than shorter steps for all.  Crowds, whose steps need not be solved, are not left out.
 """
 
-from polycorner.motion.engine.arrays import CONTACTS, OWN_GAP
+from polycorner.motion.engine.arrays import CONTACTS, LIMITS, OWN_GAP, TIE_GAP
 from polycorner.motion.engine.bounds import is_slow
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
@@ -24,11 +24,14 @@ from polycorner.motion.engine.paths import (
     MIDDLE,
     NEXT,
     START,
+    equations_fail,
     gaps_at,
     may_vanish,
     stay_apart,
+    tie_code,
     touching,
 )
+from polycorner.motion.engine.ties import form_of
 
 LARGE = 48  # blocks of an island beyond which impacts need not be located
 CROWD = 2  # bodies beyond which those that are not fast need not be, either
@@ -62,9 +65,13 @@ def leave_out(model, state, work, blocks, h):
         manner.near[0] = slow_travel(model, matrix.members[i])
         for s in range(island.start[i], island.start[i + 1]):
             b = block.order[s]
-            if block.rows[b] == 0 and strikes_early(model, state, manner, mid, pair, block, b):
+            if block.rows[b] == 0 and strikes_early(
+                model, state, manner, mid, pair, work.tie, block, b
+            ):
                 left[i] |= 1
     mark_misses(model, state, work, left, h)
+    if model.ties > 0:
+        mark_tie_misses(model, state, work, left, h)
     for i in range(N):
         # A neighbour has marked it; only what is not solved leaves a large island out.
         if is_large(island, i) and left[i] == 1:
@@ -81,6 +88,10 @@ def leave_out(model, state, work, blocks, h):
     for s in range(state.counts[CONTACTS]):  # piles of sleepers
         i, j = bodies_of(model, state, s)
         if state.pair_flags[s, 1] and not body.awake[i] and not body.awake[j]:
+            join(joined, i, j)
+    for t in range(model.ties):
+        i, j = model.tie_bodies[t, 0], model.tie_bodies[t, 1]
+        if j >= 0 and not body.awake[i]:  # nor is the other
             join(joined, i, j)
     for i in range(N):
         body.waits[i] = 0
@@ -113,11 +124,13 @@ def join(forest, i, j):
 
 
 @compiled
-def strikes_early(model, state, manner, mid, pair, block, b):
+def strikes_early(model, state, manner, mid, pair, tie, block, b):
     """Return whether an open contact is pressed, and not slowly, where the bodies are not."""
     g = block.origin[b, 2]
     if block.origin[b, 0] == OWN_GAP:
         gap, closed, bounce = mid.gap[g], state.touches[g] != 0, model.restitution[g]
+    elif block.origin[b, 0] == TIE_GAP:
+        gap, closed, bounce = tie.gap[g], state.tie_touches[g] != 0, model.tie_restitution[g]
     else:
         index = pair.before[block.origin[b, 1]]
         bounce = model.pair_restitution[family_of(model, block.bodies[b, 0], block.bodies[b, 1])]
@@ -158,9 +171,9 @@ def body_misses(model, state, work, i, h):
     missed = h * model.tolerance * work.body.island_speed[i]
     for c in range(model.dimension):
         ahead.q[i, c] = mid.q[i, c] + h * velocity.new[i, c]
-    evaluate_gaps(model, scratch, i, ahead.q, ahead.gap, ahead.gradient)
+    evaluate_gaps(model, scratch, i, ahead.q, h, ahead.gap, ahead.gradient)
     if not state.watched[i]:
-        evaluate_gaps(model, scratch, i, state.q, path.gap, path.gradient)
+        evaluate_gaps(model, scratch, i, state.q, 0.0, path.gap, path.gradient)
     for g in range(model.first_gap[i], model.first_gap[i + 1]):
         f, following = mid.gap[g], ahead.gap[g]
         if state.touches[g]:
@@ -233,3 +246,42 @@ def mark_misses(model, state, work, left, h):
         ):
             left[island.parent[i]] |= 1
             left[island.parent[j]] |= 1
+
+
+@compiled
+def tie_misses(model, state, work, t, h):
+    """Return whether bodies cross the boundary of a tie's limit; see :func:`body_misses`."""
+    mid, velocity, path, scratch = work.mid, work.velocity, work.path, work.scratch
+    gap, rate, zero = scratch.way_gap, scratch.way_rate, model.zero_gap
+    i, j, code = model.tie_bodies[t, 0], model.tie_bodies[t, 1], tie_code(t)
+    deep, limits = 2.0 * model.bending * model.gap_unit, form_of(model, t, LIMITS)
+    missed = h * model.tolerance * work.body.island_speed[i]
+    watched = state.watched[i] and (j < 0 or state.watched[j])
+    if limits > 0:
+        gaps_at(model, path, scratch, mid.q, velocity.new, i, code, 0.0, NEXT)
+        gaps_at(model, path, scratch, mid.q, velocity.new, i, code, h, FULL)
+    if limits > 0 and not watched:
+        gaps_at(model, path, scratch, state.q, state.v, i, code, 0.0, START)
+        gaps_at(model, path, scratch, state.q, state.v, i, code, 0.5 * h, MIDDLE)
+    for g in range(limits):
+        f0, rate0, f1, rate1 = gap[NEXT, g], rate[NEXT, g], gap[FULL, g], rate[FULL, g]
+        if state.tie_touches[model.tie_rows[t] + g]:
+            if f1 < min(-deep, f0 - missed):
+                return True
+            continue
+        if f0 > -zero and may_vanish(open_gap(model, f0), rate0, f1, rate1, h, deep):
+            return True
+        f0, rate0, f1, rate1 = gap[START, g], rate[START, g], gap[MIDDLE, g], rate[MIDDLE, g]
+        if not watched and f0 > 0.0 and may_vanish(f0, rate0, f1, rate1, 0.5 * h, zero):
+            return True
+    return equations_fail(model, work, t, h)
+
+
+@compiled
+def mark_tie_misses(model, state, work, left, h):
+    """Mark the islands with ties of which :func:`tie_misses` tells."""
+    body, island = work.body, work.island
+    for t in range(model.ties):
+        i = model.tie_bodies[t, 0]
+        if body.awake[i] and not is_large(island, island.parent[i]):
+            left[island.parent[i]] |= 1 if tie_misses(model, state, work, t, h) else 0

@@ -5,6 +5,7 @@ import numpy as np
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import nearest, position_of, travel
+from polycorner.motion.engine.ties import are_apart
 
 SKIN = 0.4  # relative width by which the neighbour list exceeds the reach of bodies
 MANY = 256  # bodies that are searched for neighbours column by column
@@ -196,6 +197,8 @@ def add_if_near(model, state, neighbours, i, j, along, far, count):
     far -= model.reach - model.pair_reach[family] if family >= 0 else np.inf
     near = far > 0.0 and across * across + along * along + above * above < far * far
     if count < 0 or not (near and state.alive[i] and state.alive[j]):
+        return count
+    if model.ties > 0 and are_apart(model, i, j):
         return count
     if count == model.neighbour_room:
         return NONE

@@ -93,7 +93,7 @@ def count_gaps(model, mid, neighbours, scratch, slot, limit):
     """Return how many gaps of a pair are small; the least of all is kept."""
     count, least = ZERO, np.inf
     a, b = neighbours.pairs[slot, 0], neighbours.pairs[slot, 1]
-    evaluate_pair(model, scratch, a, b, mid.q)
+    evaluate_pair(model, scratch, a, b, mid.q, limit)
     family = family_of(model, a, b)
     n = pair_inputs(model, family)
     for g in range(model.pair_gaps[family]):
@@ -153,7 +153,7 @@ def detect_pair(model, state, mid, neighbours, pair, scratch, slot, limit, share
     a, b, least = neighbours.pairs[slot, 0], neighbours.pairs[slot, 1], np.inf
     K, values, family = model.lanes, scratch.values, family_of(model, a, b)
     read, n, m = model.first_read[family], pair_inputs(model, family), model.pair_gaps[family]
-    evaluate_pair(model, scratch, a, b, mid.q)
+    evaluate_pair(model, scratch, a, b, mid.q, limit)
     for g in range(m):
         least = min(least, values[n + g])
         if values[n + g] < limit:

@@ -42,6 +42,12 @@ def find_islands(model, body, island, block, blocks):
             x, y = root_of(island.parent, i), root_of(island.parent, j)
             if x != y:
                 island.parent[max(x, y)] = min(x, y)
+    for t in range(model.ties):
+        # Also where they have no block: forces of ties depend on both bodies.
+        i, j = model.tie_bodies[t, 0], model.tie_bodies[t, 1]
+        if j >= 0 and body.awake[i] and body.awake[j]:
+            x, y = root_of(island.parent, i), root_of(island.parent, j)
+            island.parent[max(x, y)] = min(x, y)
     starts, cursor = island.start, island.cursor
     starts[0] = 0
     for i in range(N):

@@ -13,6 +13,7 @@ it from above, with bisection where there is a bracket.
 
 import numpy as np
 
+from polycorner.motion.engine.arrays import LIMITS, ROWS
 from polycorner.motion.engine.bounds import acts
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
 from polycorner.motion.engine.families import family_of, pair_inputs
@@ -23,6 +24,7 @@ from polycorner.motion.engine.neighbours import (
     pair_key,
     square_distance,
 )
+from polycorner.motion.engine.ties import evaluate_tie, form_of, rate_of_row, row_inputs
 
 MOST_SEARCH = 80  # evaluations in the search for one contact
 NEVER = np.inf
@@ -34,16 +36,21 @@ START, MIDDLE, NEXT, HALF, FULL, SEARCH = range(6)
 
 @compiled
 def gaps_at(model, path, scratch, base, velocity, i, j, t, row):
-    """Evaluate all gaps, and their rates, at a time along straight paths; ``j < 0``: surroundings.
+    """Evaluate all gaps, and their rates, at a time along straight paths.
 
+    ``j < 0`` stands for the surroundings, or is :func:`tie_code` of a tie, whose limits they are.
     They are left in a row of ``scratch.way_gap`` and ``scratch.way_rate``.
     """
     k, gap, rate = model.dimension, scratch.way_gap[row], scratch.way_rate[row]
+    if j < NONE:
+        limits_at(model, path, scratch, base, velocity, tie_code(j), t, gap, rate)
+        return
     for c in range(k):
         path.q[i, c] = base[i, c] + t * velocity[i, c]
     if j < 0:
-        # Into arrays beside those of the midpoint, which the solution of the step still needs.
-        evaluate_gaps(model, scratch, i, path.q, path.gap, path.gradient)
+        # Into arrays beside those of the midpoint, which the solution of the step still needs.  The
+        # time matters to equations, which are looked at on the way from the midpoint only.
+        evaluate_gaps(model, scratch, i, path.q, t, path.gap, path.gradient)
         first = model.first_gap[i]
         for g in range(model.first_gap[i + 1] - first):
             gap[g], rate[g] = path.gap[first + g], 0.0
@@ -52,7 +59,7 @@ def gaps_at(model, path, scratch, base, velocity, i, j, t, row):
         return
     for c in range(k):
         path.q[j, c] = base[j, c] + t * velocity[j, c]
-    evaluate_pair(model, scratch, i, j, path.q)
+    evaluate_pair(model, scratch, i, j, path.q, np.inf)
     family = family_of(model, i, j)
     first, n, m = model.first_read[family], pair_inputs(model, family), model.pair_gaps[family]
     for g in range(m):
@@ -61,6 +68,46 @@ def gaps_at(model, path, scratch, base, velocity, i, j, t, row):
             body = i if model.pair_reads[first + r, 0] == 0 else j
             c = model.pair_reads[first + r, 1]
             rate[g] += scratch.values[n + m + g * n + r] * velocity[body, c]
+
+
+@compiled
+def tie_code(t):
+    """Return the number below those of bodies that stands for a tie, and the tie of such one."""
+    return -2 - t
+
+
+@compiled
+def limits_at(model, path, scratch, base, velocity, t, time, gap, rate):
+    """Evaluate the limits of a tie, and their rates, at a time along straight paths."""
+    move_tied(model, path, base, velocity, t, time)
+    evaluate_tie(model, scratch, t, path.q, 0.0)  # limits do not depend on the time
+    for g in range(form_of(model, t, LIMITS)):
+        gap[g] = scratch.values[row_inputs(model) + g]
+        rate[g] = rate_of_row(model, scratch, t, g, velocity)
+
+
+@compiled
+def move_tied(model, path, base, velocity, t, time):
+    """Move the bodies of a tie along straight paths."""
+    for side in range(2):
+        i = model.tie_bodies[t, side]
+        for c in range(model.dimension if i >= 0 else ZERO):
+            path.q[i, c] = base[i, c] + time * velocity[i, c]
+
+
+@compiled
+def equations_fail(model, work, t, h):
+    """Return whether an equation of a tie does not hold at the next midpoint, by far."""
+    tie, scratch = work.tie, work.scratch
+    deep = 2.0 * model.bending * model.gap_unit
+    missed = h * model.tolerance * work.body.island_speed[model.tie_bodies[t, 0]]
+    move_tied(model, work.path, work.mid.q, work.velocity.new, t, h)
+    evaluate_tie(model, scratch, t, work.path.q, tie.time[0] + h)
+    for o in range(form_of(model, t, LIMITS), form_of(model, t, ROWS)):
+        gap, following = tie.gap[model.tie_rows[t] + o], scratch.values[row_inputs(model) + o]
+        if abs(following) > max(deep, abs(gap) + missed):
+            return True
+    return False
 
 
 @compiled
@@ -225,6 +272,43 @@ def acceptable_to(model, state, work, i, j, h, out):
             bilateral = j < 0 and first + g >= model.first_equation[i]
             sunk = sunk or (bilateral and following > deep)
     # A contact sinks by the square of the length: halves are a quarter as bad.
+    if sunk and h > model.shortest_part * model.step:
+        length = min(length, 0.5 * h)
+    return length
+
+
+@compiled
+def acceptable_to_ties(model, state, work, h, out):
+    """Return how long a part of a step may be for the ties of bodies."""
+    length = h
+    for t in range(model.ties):
+        if work.body.awake[model.tie_bodies[t, 0]]:
+            length = min(length, acceptable_to_tie(model, state, work, t, h, out))
+    return length
+
+
+@compiled
+def acceptable_to_tie(model, state, work, t, h, out):
+    """Return how long a part of a step may be for a tie; see :func:`acceptable_to`."""
+    manner, mid, velocity = work.manner, work.mid, work.velocity
+    path, scratch, i, code = work.path, work.scratch, model.tie_bodies[t, 0], tie_code(t)
+    deep, length, limits = 2.0 * model.bending * model.gap_unit, h, form_of(model, t, LIMITS)
+    missed = h * model.tolerance * work.body.island_speed[i]
+    sunk = equations_fail(model, work, t, h)
+    if limits > 0:
+        look_ahead(model, state, mid, velocity, path, scratch, i, code, h)
+    for g in range(limits):
+        row = model.tie_rows[t] + g
+        closed, bounce = state.tie_touches[row] != 0, model.tie_restitution[row]
+        near, rate = scratch.way_gap[NEXT, g], scratch.way_rate[MIDDLE, g]
+        acting = acts(model, manner, near, rate, bounce, closed)
+        if not closed:
+            first = first_in_gap(
+                model, state, mid, velocity, path, scratch, i, code, g, acting, h, out
+            )
+            length = min(length, first)
+        if acting:
+            sunk = sunk or scratch.way_gap[FULL, g] < min(-deep, near - missed)
     if sunk and h > model.shortest_part * model.step:
         length = min(length, 0.5 * h)
     return length

@@ -127,7 +127,7 @@ def book_range(model, state, work, kind, begin, end, sums):
     h, time = shared.times[codes.LENGTH], shared.times[codes.TIME]
     for b in range(begin, end):
         if kind == codes.OBSERVE:
-            book_block(model, body, work.block, b, sums)
+            book_block(model, body, work.tie, work.block, b, sums)
             observe_block(model, state, work, b, h, time, sums)
         else:
             book_body(model, state, mid, velocity, body, sleep, b, sums)

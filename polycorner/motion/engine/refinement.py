@@ -16,23 +16,23 @@ from polycorner.motion.engine.arrays import (
     EVENTS_FULL,
     HALVED,
     LAST,
-    OWN_GAP,
     PARTS,
     RESIDUAL,
     STEPS,
     SWEEPS,
     UNSOLVED,
 )
-from polycorner.motion.engine.contact_list import FAILED, INSTANT, record
+from polycorner.motion.engine.contact_list import FAILED, INSTANT, place_of, record
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.left_out import leave_out, slow_travel
-from polycorner.motion.engine.paths import acceptable_length
+from polycorner.motion.engine.paths import acceptable_length, acceptable_to_ties
 from polycorner.motion.engine.sleep import stays_asleep, wake
 from polycorner.motion.engine.solution import evaluate_bodies
 from polycorner.motion.engine.stepping import attempt, commit
+from polycorner.motion.engine.tie_blocks import evaluate_ties
 
 SHORTEST_SOLVED = 1.0 / 16.0  # of a step, to which parts are halved to be solved
 MOST_PARTS = 100_000  # of one step, beyond which the rest is done at once
@@ -61,11 +61,9 @@ def record_failure(model, work, log, root, time, count):
         if far > worst:
             worst, place = far, block.order[s]
     b = block.pressing[place] if block.pressing[place] >= 0 else place
-    i, j, g = block.bodies[b, 0], block.bodies[b, 1], block.origin[b, 2]
-    if block.rows[b] > 0:
-        g = NONE
-    elif block.origin[b, 0] != OWN_GAP:
-        i, j = pair.contact[block.origin[b, 1], 0], pair.contact[block.origin[b, 1], 1]
+    i, j, g = block.bodies[b, 0], block.bodies[b, 1], NONE
+    if block.rows[b] == 0:
+        i, j, g = place_of(model, pair, block, b)
     return record(log, count, FAILED, i, j, g, time, block.impulse[b, 0])
 
 
@@ -100,6 +98,8 @@ def solve_part(model, state, work, h, time, index):
     for i in range(model.bodies):
         if state.alive[i] and work.body.awake[i]:
             evaluate_body(model, state, mid, scratch, i, h, time + 0.5 * h, index)
+    if model.ties > 0:
+        evaluate_ties(model, state, work, h, time + 0.5 * h)
     return attempt(model, state, work, h, time, index, True)
 
 
@@ -134,6 +134,8 @@ def refine(model, state, work, log, root, index, count):
                 h, halved = 0.5 * h, True
                 continue
             length = acceptable_length(model, state, work, h, work.scratch.image)
+            if model.ties > 0:
+                length = min(length, acceptable_to_ties(model, state, work, h, work.scratch.image))
             length = max(length, INSTANT * H)
             if length >= h:
                 break

@@ -4,6 +4,7 @@ from polycorner.motion.engine.families import coordinates_of, kind_of
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.linear_algebra import add_square, solve_spd
 from polycorner.motion.engine.sets import contains
+from polycorner.motion.engine.ties import is_tied
 
 SET_SLACK = 1e-9  # relative slack with which forces at rest may lie outside their sets
 SLEEP_MARGIN = 0.01  # share of friction left unused by sleepers that need no check
@@ -56,6 +57,9 @@ def find_rest_velocity(model, mid, scratch, lam, i, out):
     for g in range(model.first_gap[i], model.first_gap[i + 1]):
         if holds(model, lam, i, g):
             add_square(A, mid.gradient[g], 1.0, k)
+            if model.timed:
+                for c in range(k):
+                    out[c] -= mid.gradient[g, model.dimension] * mid.gradient[g, c]
     for f in range(model.first_friction[i], model.first_friction[i + 1]):
         if load_of(model, mid, lam, i, f) > 0.0:
             for r in range(model.slip_start[f], model.slip_start[f + 1]):
@@ -82,7 +86,8 @@ def keeps_contacts(model, mid, lam, i, v):
     k = model.dimension
     for g in range(model.first_gap[i], model.first_gap[i + 1]):
         if holds(model, lam, i, g):
-            value, size = 0.0, 0.0
+            value = mid.gradient[g, k] if model.timed else 0.0
+            size = abs(value)
             for c in range(k):
                 value += mid.gradient[g, c] * v[c]
                 size += abs(mid.gradient[g, c] * v[c])
@@ -210,6 +215,7 @@ def comes_to_rest(model, state, work, i, rest):
     if (
         still
         and not work.manner.located[0]
+        and not is_tied(model, i)  # see `tied_sleep`
         and remains_at_rest(model, state, mid, sleep, scratch, i, others)
     ):
         state.asleep[i] = 1

@@ -17,7 +17,7 @@ class Sizes(NamedTuple):
     N: int  # bodies
     A: int  # kinds of bodies
     k: int  # coordinates of a body, of the kind that has most of them
-    K: int  # the same, rounded up to whole vectors
+    K: int  # the same, and the time if equations have it, rounded up to whole vectors
     F: int  # friction contacts of all bodies with their surroundings
     R: int  # rows of their slip velocities
     L: int  # known loads of a body, at least 1
@@ -27,7 +27,7 @@ class Sizes(NamedTuple):
     G: int  # gaps between two bodies, at most
     H: int  # laws of friction of all families
     T: int  # rows of the slip velocities of a family, at most
-    Y: int  # gaps of a body or of two, whichever are more
+    Y: int  # gaps of a body, of two, or of a tie, whichever are most
     D: int  # causes of dissipation
     C: int  # contacts between bodies for which there is room
     P: int  # pairs of neighbours for which there is room
@@ -39,6 +39,10 @@ class Sizes(NamedTuple):
     M: int  # numbers in the matrix
     Z: int  # strips
     V: int  # items of a phase
+    TJ: int  # ties
+    TU: int  # their limits and equations
+    TX: int  # their friction contacts
+    RC: int  # equations of a closed component, times its coordinates
 
     @classmethod
     def of(cls, bodies: MovingBodies, contacts: int) -> "Sizes":
@@ -49,15 +53,18 @@ class Sizes(NamedTuple):
         called = [kind.body.formulation.forces for kind in kinds]
         for family in families:
             called += [family.gaps, *(slip for slip, _, _ in family.slips)]
+        ties = bodies.ties
+        called += [f for form in ties.forms for f in (form.rows, form.slips, form.forces) if f]
         shapes = [(len(f.names), len(f.variables)) for f in called]
         calls = [c for a in kinds for c in (*a.body.gaps, *a.body.formulation.slip_calls)]
         shapes += [(len(call.family.names), len(call.reads)) for call in calls]
         kernels = [m * (1 + k) + k for m, k in shapes]
-        lanes = -(-k // WIDTH) * WIDTH
+        lanes = -(-(k + any(kind.body.timed for kind in kinds)) // WIDTH) * WIDTH
         pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
         entries = N * min(N - 1, MOST_ENTRIES)
         laws = max((len(family.laws) for family in families), default=0)
-        blocks = F + own + (1 + laws) * contacts
+        rows, slips = len(ties.names), len(ties.friction)
+        blocks = F + own + (1 + laws) * contacts + rows + slips
         gaps = max((len(family.gaps.names) for family in families), default=0)
         most = max(len(kind.body.contacts) for kind in kinds)
         return cls(
@@ -74,16 +81,20 @@ class Sizes(NamedTuple):
             G=gaps,
             H=sum(len(family.laws) for family in families),
             T=max((sum(law.rows for law in family.laws) for family in families), default=0),
-            Y=max(most, gaps),
+            Y=max(most, gaps, ties.most_rows),
             D=len(bodies.causes),
             C=contacts,
             P=pairs,
             B=blocks,
-            E=EVENTS + 2 * contacts + 3 * N + own,
+            E=EVENTS + 2 * contacts + 3 * N + own + rows,
             S=max(contacts, pairs, 1),
             W=max(kernels) + 16,
             Q=entries,
             M=(N + 2 * entries) * lanes * lanes,
             Z=MOST_STRIPS,
             V=max(N, pairs, blocks) // AT_ONCE + 1,
+            TJ=len(ties.bodies),
+            TU=rows,
+            TX=slips,
+            RC=ties.closed_room(k, max(kind.body.equations for kind in kinds)),
         )

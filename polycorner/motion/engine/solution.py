@@ -25,6 +25,8 @@ from polycorner.motion.engine.phases import items_of, share_out, share_range
 from polycorner.motion.engine.rows import apply_impulses
 from polycorner.motion.engine.signals import increase
 from polycorner.motion.engine.sizes import AT_ONCE
+from polycorner.motion.engine.tie_blocks import assemble_ties, evaluate_ties, predict_ties
+from polycorner.motion.engine.tied_sleep import wake_together
 
 MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
 
@@ -34,7 +36,11 @@ def evaluate_bodies(model, state, work, h, time, index):
     """Evaluate all bodies that are not asleep."""
     shared = work.shared
     shared.times[codes.TIME], shared.told[codes.STEP_INDEX] = time, index
+    if model.ties > 0:
+        wake_together(model, state)
     share_range(model, state, work, codes.EVALUATE, model.bodies, h)
+    if model.ties > 0:
+        evaluate_ties(model, state, work, h, time)
 
 
 @compiled
@@ -77,7 +83,9 @@ def assemble_blocks(model, state, work, h, contacts, ascending):
     body, shared = work.body, work.shared
     limit = shared.times[codes.DISTANCE] = detection_distance(model, body, h)
     share_range(model, state, work, codes.PREDICT, model.bodies, h)
-    first = assemble_body_blocks(model, state, work, h, limit)
+    own = first = assemble_body_blocks(model, state, work, h, limit)
+    if model.ties > 0:
+        first = assemble_ties(model, state, work, h, limit, own)
     order_contacts(model, state, work.pair, contacts, ascending)
     if work.manner.located[0]:  # contacts have blocks only if they are closed
         blocks = assemble_contacts(model, state, work, h, ZERO, contacts, first)
@@ -87,6 +95,8 @@ def assemble_blocks(model, state, work, h, contacts, ascending):
         share_range(model, state, work, codes.ASSEMBLE, contacts, h)
     find_islands(model, body, work.island, work.block, blocks)
     start_blocks(model, work, blocks)
+    if model.ties > 0:
+        predict_ties(model, work, own, first, h)
     return blocks
 
 
@@ -116,7 +126,7 @@ def solve_islands(model, state, work, blocks, h, again):
     """
     island, shared = work.island, work.shared
     starts = island.start
-    most = 2 if model.equations == 0 else MOST_CORRECTIONS
+    most = 2 if model.equations == 0 and model.ties == 0 else MOST_CORRECTIONS
     if model.follows_velocity:
         most = 1
     for attempt in range(most):

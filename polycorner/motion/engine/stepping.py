@@ -167,7 +167,7 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
     # Before velocities change: it compares with the state before the step.
     observe(model, state, work, blocks, h, time)
     if any_awake:
-        count = record_contacts(work.pair, work.block, work.event, log, blocks, count)
+        count = record_contacts(model, work.pair, work.block, work.event, log, blocks, count)
         if model.families > 0:
             count = list_contacts(model, state, work, log, h, time, count)
     for i in range(N):

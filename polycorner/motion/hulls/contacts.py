@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.kernels import address
-from polycorner.motion.bodies import PairContacts, PairLaw
+from polycorner.motion.bodies import FrictionContact, PairContacts, PairLaw
 from polycorner.motion.contacts import ContactFamily
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.hulls.intermediate import NAMES, SHIPPED
@@ -65,6 +66,18 @@ class Hull(Value):
 
 def _padded(vectors: Array) -> Array:
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+
+
+def _placed(vertices: Array, q: Array) -> Array:
+    """Return vertices of a body with the coordinates ``q``, none if it is fixed, in space."""
+    d = vertices.shape[1]
+    origin, turned = q[:d], q[d:]
+    if len(turned) == 1:
+        (cosine,), (sine,) = np.cos(turned), np.sin(turned)
+        vertices = vertices @ np.array([[cosine, sine], [-sine, cosine]])
+    elif len(turned):
+        vertices = vertices @ Rotation.from_quat(turned[[1, 2, 3, 0]]).as_matrix().T
+    return vertices + origin if len(q) else vertices
 
 
 VALUES = 9  # entry of a table for the address of formulas; that of their gradients follows
@@ -221,6 +234,51 @@ class HullContacts(Value):
         kernel, numbers = call.family.kernel, call.parameters.ctypes.data
         return np.array([kernel.at(x, numbers, 0)[0] for x in q[:, call.reads]])
 
+    def site(self, contact: str, q: Array) -> tuple[Array, Array]:
+        """Return where a contact is, and the normal towards the second body, ``(d,)`` each.
+
+        ``q`` are the coordinates in the order of :attr:`reads`.  The normal is the gradient by
+        where the second body is, that of the plane along which the contact closes.
+        """
+        d, n, (first, _) = self.dimension, len(self.reads), self.coordinates
+        call = self.gaps_of(self.reads, 0)
+        f, J, at = np.empty(len(self.names)), np.zeros((len(self.names), n)), np.array(q)
+        kernel = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5)
+        run = kernel(call.family.kernel.compiled(1).point)
+        table = call.parameters.ctypes.data
+        run(address(at), table, address(f), address(J), None)
+        row = J[self.names.index(contact)]
+        normal = row[first : first + d] if n > first else -row[:d]
+        ends = q[:first], q[first:]
+        for one, two in self.pairs:
+            a, b = (_placed(hull.vertices, own) for hull, own in zip((one, two), ends, strict=True))
+            b = b + self._shift(ends, d)
+            k, m = len(one.vertices), len(two.vertices)
+            if contact not in (known := one.touches(two)):
+                continue
+            g = known.index(contact)
+            if g < m:
+                return b[g], normal
+            if g < m + k:
+                return a[g - m], normal
+            i, j = divmod(g - m - k, len(two.edges))
+            (p, u), (r, w) = ((x[e[0]], x[e[1]]) for x, e in ((a, one.edges[i]), (b, two.edges[j])))
+            # They cross as seen along the normal.
+            sides = np.column_stack([u - p, r - w, normal])
+            along = np.linalg.lstsq(sides, r - p, rcond=None)[0][0]
+            return p + np.clip(along, 0.0, 1.0) * (u - p), normal
+        raise KeyError(contact)
+
+    def _shift(self, ends: tuple[Array, Array], d: int) -> Array:
+        """Return the way to the image of the second body that is nearest to the first."""
+        periods = np.array([*self.periods, *[np.inf] * d])[:d]
+        finite = np.isfinite(periods)
+        shift = np.zeros(d)
+        if finite.any():
+            away = (ends[1][:d] - ends[0][:d])[finite] / periods[finite]
+            shift[finite] = -periods[finite] * np.floor(away + 0.5)
+        return shift
+
     def described(self) -> dict[str, Any]:
         """Return everything that a motion depends on, by name, as plain values."""
         laws = [[str(law.static), str(law.dynamic), law.cause] for law in self.laws]
@@ -267,3 +325,27 @@ class HullContacts(Value):
             self.restitution,
             self.reach,
         )
+
+
+def beside(
+    several: Sequence[HullContacts], names: Sequence[str], first: int, row: int
+) -> tuple[list[Call], tuple[FrictionContact, ...], list[Call]]:
+    """Return gaps, friction and slips of hulls of a system with the coordinates ``names``.
+
+    Contacts are numbered from ``first``, slips from ``row`` on.
+    """
+    gaps, rubbing, slips = [], list[FrictionContact](), []
+    for hulls in several:
+        gaps.append(hulls.gaps_of(names, first))
+        rows, some = (
+            hulls.dimension - 1,
+            [g for g, n in enumerate(hulls.names) if n in hulls.friction],
+        )
+        for g in some:
+            name, sets = hulls.names[g], hulls.friction[hulls.names[g]]
+            law = FrictionContact(f"{name} slips", rows, *sets, first + g, (), "sliding")
+            rubbing.append(law)
+        if some:
+            slips.append(hulls.slips_of(names, some, row))
+        first, row = first + len(hulls.names), row + rows * len(some)
+    return gaps, tuple(rubbing), slips

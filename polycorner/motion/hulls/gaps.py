@@ -60,6 +60,10 @@ from polycorner.motion.hulls.geometry import (
 from polycorner.motion.hulls.memory import compiled, get, put
 from polycorner.motion.hulls.planes import FIRST, SECOND, is_far, plane_between
 
+# What slips keep for the next contact: which table and parts, the coordinates, and what follows
+# from these: rotations, a shift and a normal.  The number before is that of the limit of gaps.
+TABLE, PARTS, PLACE, FRAMES = 1, 2, 3, 17
+
 # How gradients are written: those of infinite gaps not at all, or none is infinite.
 PAIR_SLOPES, OWN_SLOPES = np.int64(1), np.int64(2)
 
@@ -188,8 +192,17 @@ def show_overlap(q, table, here, s, f, J, slopes):
 
 
 @compiled
-def evaluate_parts(q, table, here, s, f, J, slopes):
-    """Write the gaps of two parts and, unless ``slopes`` is zero, their gradients."""
+def is_wanted(wanted, g):
+    """Return whether a gap is wanted, as all are if there are no numbers that say it."""
+    return wanted == 0 or get(wanted, g) != 0.0
+
+
+@compiled
+def evaluate_parts(q, table, here, s, f, J, slopes, limit, wanted):
+    """Write the gaps of two parts and, unless ``slopes`` is zero, gradients of those below a limit.
+
+    If ``wanted`` is the address of numbers, gaps for which these are zero may be left out.
+    """
     m, _, r, t = here
     one, two, g = parts_of(table, s)
     width = whole(table, ONE) + whole(table, TWO)
@@ -202,26 +215,31 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
             put(f, g + a, none)
         slot = j if kind == FIRST else whole(table, two + VERTICES) + j
         put(f, g, height)
-        if slopes:
+        if slopes and height < limit:
             x = point_of(table, here, one, two, normal, slot)
             add_row(q, table, here, turned(m, normal), x, J + 8 * width * g, np.int64(0))
         return
+    # Whether any gap says that parts overlap is known only when all are.
+    deep = height < -get(table, THROUGH)
+    wanted = np.int64(0) if deep else wanted
     along, inward, least = turned(m, normal), scaled(-1.0, back(r, normal)), np.inf
     for v in range(whole(table, two + VERTICES)):
-        x = beyond(turned(r, triple(table, vertex_at(two, v))), 1.0, t)
-        gap = vertex_gap(table, one, x, normal, height)
-        least = min(least, gap)
-        put(f, g, gap)
-        if slopes:
-            add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
+        if is_wanted(wanted, g):
+            x = beyond(turned(r, triple(table, vertex_at(two, v))), 1.0, t)
+            gap = vertex_gap(table, one, x, normal, height)
+            least = min(least, gap)
+            put(f, g, gap)
+            if slopes and gap < limit:
+                add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
         g += 1
     for v in range(whole(table, one + VERTICES)):
-        x = triple(table, vertex_at(one, v))
-        gap = vertex_gap(table, two, back(r, beyond(x, -1.0, t)), inward, height)
-        least = min(least, gap)
-        put(f, g, gap)
-        if slopes:
-            add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
+        if is_wanted(wanted, g):
+            x = triple(table, vertex_at(one, v))
+            gap = vertex_gap(table, two, back(r, beyond(x, -1.0, t)), inward, height)
+            least = min(least, gap)
+            put(f, g, gap)
+            if slopes and gap < limit:
+                add_row(q, table, here, along, x, J + 8 * width * g, np.int64(0))
         g += 1
     edges, others = whole(table, one + EDGES), whole(table, two + EDGES)
     for b in range(others):
@@ -230,24 +248,24 @@ def evaluate_parts(q, table, here, s, f, J, slopes):
         y, v = beyond(turned(r, triple(table, at)), 1.0, t), turned(r, triple(table, at + 3))
         for a in range(edges):
             at, slot, gap, meets = edge_at(table, one, a), g + a * others + b, np.inf, 0.0
-            if other and faces_along(table, at, normal):
+            if other and is_wanted(wanted, slot) and faces_along(table, at, normal):
                 x, u = triple(table, at), triple(table, at + 3)
                 gap, meets = edge_gap(table, x, u, y, v, normal)
                 least = min(least, gap)
-                if slopes and gap < np.inf:
+                if slopes and gap < limit:
                     x = beyond(x, meets, u)
                     add_row(q, table, here, along, x, J + 8 * width * slot, np.int64(0))
             put(f, slot, min(gap, none))
-    if least > 0.0 and height < -get(table, THROUGH):
+    if deep and least > 0.0:
         show_overlap(q, table, here, s, f, J, slopes)
 
 
 @compiled
-def gaps(q, table, f, J, slopes):
+def gaps(q, table, f, J, slopes, limit, wanted):
     """Write the gaps of two bodies, and their gradients unless ``slopes`` is zero."""
     here = places(q, table)
     for s in range(whole(table, PAIRS)):
-        evaluate_parts(q, table, here, s, f, J, slopes)
+        evaluate_parts(q, table, here, s, f, J, slopes, limit, wanted)
     formulas = whole(table, GRADIENTS if slopes else VALUES)
     if formulas != 0:
         count = whole(table, CONTACTS)
@@ -258,14 +276,18 @@ def gaps(q, table, f, J, slopes):
 
 @compiled
 def values(q, table, f, J, H):
-    """Write the gaps of two bodies."""
-    return gaps(q, table, f, J, np.int64(0))
+    """Write the gaps of two bodies, at least those for which the numbers at ``H`` are not zero."""
+    return gaps(q, table, f, J, np.int64(0), np.inf, H)
 
 
 @compiled
 def gradients(q, table, f, J, H):
-    """Write the gaps of two bodies and their gradients; infinite ones have none."""
-    return gaps(q, table, f, J, PAIR_SLOPES)
+    """Write the gaps of two bodies, and the gradients of those below the number at ``H``, if any.
+
+    Infinite gaps have none.
+    """
+    limit = np.inf if H == 0 else get(H, np.int64(0))
+    return gaps(q, table, f, J, PAIR_SLOPES, limit, np.int64(0))
 
 
 @compiled
@@ -274,7 +296,7 @@ def finite(q, table, f, J, H):
     width = whole(table, ONE) + whole(table, TWO)
     for a in range(width * whole(table, CONTACTS)):
         put(J, np.int64(a), 0.0)
-    return gaps(q, table, f, J, OWN_SLOPES)
+    return gaps(q, table, f, J, OWN_SLOPES, np.inf, np.int64(0))
 
 
 @compiled
@@ -304,21 +326,62 @@ def add_slip(q, table, here, normal, x, f, J, row):
 
 
 @compiled
+def nine(numbers, at):
+    """Return the nine numbers of a matrix."""
+    x, y, z = triple(numbers, at), triple(numbers, at + 3), triple(numbers, at + 6)
+    return x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]
+
+
+@compiled
+def is_kept(q, table, s, kept):
+    """Return whether what is kept is of these two parts where they are."""
+    if get(kept, np.int64(PARTS)) != s or get(kept, np.int64(TABLE)) != table:
+        return False
+    for a in range(whole(table, ONE) + whole(table, TWO)):
+        if get(kept, np.int64(PLACE + a)) != get(q, np.int64(a)):
+            return False
+    return True
+
+
+@compiled
+def placed_parts(q, table, s, kept):
+    """Return where both bodies are, and the normal of the plane between two of their parts.
+
+    They are the same for all contacts of these: the last ones are ``kept`` at an address.
+    """
+    if kept != 0 and is_kept(q, table, s, kept):
+        here = nine(kept, FRAMES), nine(kept, FRAMES + 9), nine(kept, FRAMES + 18)
+        return (*here, triple(kept, FRAMES + 27)), triple(kept, FRAMES + 30)
+    here = places(q, table)
+    m, n, r, t = here
+    one, two, _ = parts_of(table, s)
+    _, normal, _, _, _ = plane_between(table, one, two, r, t)
+    if kept != 0:
+        put(kept, np.int64(TABLE), np.float64(table))
+        put(kept, np.int64(PARTS), np.float64(s))
+        for a in range(whole(table, ONE) + whole(table, TWO)):
+            put(kept, np.int64(PLACE + a), get(q, np.int64(a)))
+        numbers = (*m, *n, *r, *t, *normal)
+        for a in range(len(numbers)):
+            put(kept, np.int64(FRAMES + a), numbers[a])
+    return here, normal
+
+
+@compiled
 def slips(q, entry, f, J, H):
     """Write the slip velocities at a contact, and their derivatives by velocities.
 
-    The entry of a contact has its number, and by how many numbers the table begins before.
+    The entry of a contact has its number, and by how many numbers the table begins before; at
+    ``H``, unless that is 0, there is room for what its neighbours have in common with it.
     """
     table, g = entry - 8 * whole(entry, 1), whole(entry, 0)
     s = whole(table, PAIRS) - 1
     while s > 0 and whole(table, HEAD + PAIR * s + 2) > g:
         s -= 1
     one, two, first = parts_of(table, s)
-    here = places(q, table)
-    m, _, r, t = here
-    _, normal, _, _, _ = plane_between(table, one, two, r, t)
+    here, normal = placed_parts(q, table, np.int64(s), H)
     x = point_of(table, here, one, two, normal, g - first)
-    add_slip(q, table, here, turned(m, normal), x, f, J, np.int64(0))
+    add_slip(q, table, here, turned(here[0], normal), x, f, J, np.int64(0))
     return 0
 
 

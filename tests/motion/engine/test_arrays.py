@@ -88,6 +88,16 @@ def test_constants_are_brought_to_their_type_and_shape():
         filled(Model, SIZES, {**values, "kicks": [1, 2, 3]})
 
 
+def test_slips_of_a_kernel_belong_to_the_contacts_of_their_rows():
+    model = model_of(THREE, SIZES, Noise(), Solver(), 0.0, 1e-3)
+    places, contacts = model.slip_places[:-1], model.slip_contacts[:-1]
+    used = places >= 0
+    starts = model.slip_start[: model.first_friction[1] + 1]
+    assert sorted(places[used]) == [*range(starts[-1])]
+    assert (starts[contacts[used]] <= places[used]).all()
+    assert (places[used] < starts[contacts[used] + 1]).all()
+
+
 def test_a_body_without_friction_has_arrays():
     M = Manifold.euclidean("x")
     bodies = System(Polyhedron(M, {"floor": M.symbols[0]}), velocities(M)[0] ** 2 / 2).bodies

@@ -12,7 +12,7 @@ from polycorner import Friction, Manifold, Polyhedron, System, velocities
 from polycorner.bodies import Arrangement, HalfSpace, Mass, disc, sphere
 from polycorner.motion import ContactFamily, Disc, pair_coordinates
 from polycorner.motion.checkpoints import Checkpoint
-from polycorner.motion.engine.arrays import CONTACTS, OWN, Work, declarations
+from polycorner.motion.engine.arrays import CONTACTS, OWN, RESIDUAL, TieWork, Work, declarations
 from polycorner.motion.engine.crowds import CROWD, PERIOD
 from polycorner.motion.noise import OPTIONS, Solver
 from polycorner.motion.simulation import simulate, start
@@ -71,6 +71,7 @@ def test_threads_share_no_array_in_which_something_is_in_the_making():
     }
     serial = {"neighbours.status", "neighbours.travel", "manner.near", "pair.sort_keys"}
     serial |= {"crowd.strips", "crowd.strip_cursor", "crowd.strip_start"}
+    serial |= {f"tie.{name}" for name in TieWork._fields}
     told = {f"shared.{name}" for name in ("finite", "signals", "told", "times", "worst")}
     assert whole == serial | told | {"manner.located", "manner.remedy"}
 
@@ -144,7 +145,7 @@ def test_a_step_with_new_ranks_starts_from_the_impulses_of_the_step_before():
     engine.advance(PERIOD - 3)
     for _ in range(6):
         ranks, pairs = engine.motion.body_of_rank.copy(), listed_pairs(engine)
-        engine.motion.sums[4] = 0.0
+        engine.motion.sums[RESIDUAL] = 0.0
         engine.advance(1)
         left.append(engine.effort.residual)
         renewed = (engine.motion.body_of_rank != ranks).any()
@@ -162,7 +163,7 @@ def test_a_step_with_new_ranks_starts_from_the_impulses_of_the_step_before():
 def test_a_few_sweeps_leave_admissible_impulses_and_a_residual_that_is_told(friction):
     engine, met = heap(friction, crowd_sweeps=6), 0
     for _ in range(80):
-        engine.motion.sums[4] = 0.0  # the residual, of all steps before
+        engine.motion.sums[RESIDUAL] = 0.0  # the residual, of all steps before
         engine.advance(1)
         work, blocks = engine.work, crowds(engine)
         if len(blocks) != 1:
@@ -191,7 +192,7 @@ def test_more_sweeps_come_nearer_to_the_solution():
     for sweeps in (10, 1000, 10000):
         engine = heap(friction=0.0, crowd_sweeps=sweeps)
         engine.load({name: array.copy() for name, array in begun.save().items()})
-        engine.motion.sums[4] = 0.0
+        engine.motion.sums[RESIDUAL] = 0.0
         engine.advance(1)
         assert crowds(engine)
         left.append(engine.effort.residual)
