@@ -304,7 +304,7 @@ class Arrangement(Checked, Printed):
         count: int | Mapping[str, int] = 1,
         joints: Mapping[str, Any] | None = None,
         drives: Mapping[str, Drive] | None = None,
-        forces: Mapping[str, Sequence[Any]] | None = None,
+        forces: Mapping[str, Any] | None = None,
     ) -> System | Assembly:
         """Return the mechanical system of the bodies.
 

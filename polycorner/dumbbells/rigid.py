@@ -126,6 +126,7 @@ class RigidDumbbells(Checked):
             exits={"yD": drum.top} if math.isfinite(drum.top) else {},
             count=drum.count,
         )
+        assert isinstance(system, System)  # of one kind
         if drum.uneven_friction is None:
             return system
         return replace(system, friction=tuple(map(self._uneven, system.friction)))

@@ -256,7 +256,7 @@ class System(MechanicalSystem, Printed):
         return (*self.contacts, *self.polyhedron.equation_names, *self.rheonomic)
 
     @cached_property
-    def _followed(self) -> Family:
+    def followed(self) -> Family:
         """The equations with the time, functions of the coordinates and of it."""
         return Family.of(self.rheonomic, (*self.manifold.names, TIME))
 
@@ -314,7 +314,7 @@ class System(MechanicalSystem, Printed):
         equations = len(self._normals) - len(self.contacts)
         if timed := len(self.rheonomic):
             reads, last = range(len(coordinates) + 1), range(len(self._normals))[-timed:]
-            call = Call(self._followed, (*reads,), np.empty(0), (*last,), (*range(timed),))
+            call = Call(self.followed, (*reads,), np.empty(0), (*last,), (*range(timed),))
             gaps = [*gaps, call]
         formulation = replace(self.formulation, further=slips) if slips else self.formulation
         body = MovingBody(
@@ -390,7 +390,7 @@ class System(MechanicalSystem, Printed):
         time, shape = real("time", time, unit="s"), (self.count, self.manifold.size)
         if self.rheonomic:
             scales = self.manifold.scale_array
-            check_followed(self._followed, scales, places, speeds, time, self.bodies.called)
+            check_followed(self.followed, scales, places, speeds, time, self.bodies.called)
         check_ties(self.bodies, places.reshape(shape), speeds.reshape(shape), time)
         return State(time, places, speeds, self.sticks(places, speeds, time))
 
@@ -436,17 +436,6 @@ class System(MechanicalSystem, Printed):
             rests = np.stack([~slips[:, a:b].any(axis=1) for a, b in pairwise(starts)], axis=-1)
             found.insert(0, rests.reshape(*shape, len(self.friction)))
         return np.concatenate(found, axis=-1)
-
-    def equations_at(self, q: Array, time: float) -> tuple[Array, Array] | None:
-        """Return gradients ``(k, n)`` and Hessians ``(k, n, n)`` of all equations, if any."""
-        held = bends(self.polyhedron, q)
-        if not self.rheonomic:
-            return held
-        _, *found = self._followed.evaluate(np.append(q, time), order=2)
-        rows, curved = found[0][:, :-1], found[1][:, :-1, :-1]
-        if held is None:
-            return rows, curved
-        return np.concatenate([held[0], rows]), np.concatenate([held[1], curved])
 
     @checked
     def energies(self, state: State) -> tuple[float, float]:
@@ -519,7 +508,7 @@ def leapfrog_limit(
     for system, places, speeds in placed:
         scales, law, known = system.manifold.scale_array, system.formulation, system.parameters
         for q, v in zip(places, speeds, strict=True):
-            held = system.equations_at(q, time)
+            held = _equations_at(system, q, time)
             if not ties.bodies:
                 squared = max(squared, highest_square(law, known, scales, q, v, held))
             if system.forces:
@@ -540,3 +529,15 @@ def _short(energy: "sympy.Expr | float") -> str:
     """Return a formula, or what it is where writing it would take long."""
     terms = len(getattr(energy, "args", ()))
     return f"a sum of {terms} terms" if terms > MOST_TERMS else brief(energy)
+
+
+def _equations_at(system: "System", q: Array, time: float) -> tuple[Array, Array] | None:
+    """Return gradients ``(k, n)`` and Hessians ``(k, n, n)`` of all equations, if any."""
+    held = bends(system.polyhedron, q)
+    if not system.rheonomic:
+        return held
+    _, *found = system.followed.evaluate(np.append(q, time), order=2)
+    rows, curved = found[0][:, :-1], found[1][:, :-1, :-1]
+    if held is None:
+        return rows, curved
+    return np.concatenate([held[0], rows]), np.concatenate([held[1], curved])
