@@ -298,7 +298,7 @@ def names(argument: str, given: Iterable[str], known: Iterable[str]) -> None:
     if isinstance(given, str | bytes) or not isinstance(given, Iterable):
         refuse(argument, f"names among {', '.join(words) or 'none'}", given, TypeError)
     for name in given:
-        if name not in words:
+        if not isinstance(name, str) or name not in words:
             shown = nearest(name, words) if isinstance(name, str) else repr(name)
             msg = f"{argument}: expected names among {', '.join(words) or 'none'}; got {shown}"
             raise ValueError(msg)

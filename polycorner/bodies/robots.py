@@ -150,9 +150,9 @@ class Robot(Checked):
         """Return the robot with more around it, and more pairs that do not touch."""
         return replace(
             self,
-            walls={**self.walls, **checks.mapping("walls", walls or {})},
-            fixed={**self.fixed, **checks.mapping("fixed", fixed or {})},
-            bodies={**self.bodies, **checks.mapping("bodies", bodies or {})},
+            walls={**self.walls, **checks.mapping("walls", {} if walls is None else walls)},
+            fixed={**self.fixed, **checks.mapping("fixed", {} if fixed is None else fixed)},
+            bodies={**self.bodies, **checks.mapping("bodies", {} if bodies is None else bodies)},
             ignored=(*self.ignored, *ignored),
         )
 
@@ -454,11 +454,12 @@ class Robot(Checked):
 
     def _wall_friction(self, given: float | Mapping[str, float]) -> Iterator[Friction]:
         """Yield the friction of links and bodies at half-spaces."""
-        by_wall = given if isinstance(given, Mapping) else dict.fromkeys(self.walls, given)
-        checks.names("friction", by_wall, self.walls)
+        if not isinstance(given, Mapping):
+            given = dict.fromkeys(self.walls, checks.real("friction", given, least=0))
+        checks.names("friction", given, self.walls)
         for one, met in self._at_walls:
             name, wall = met.name, met.wall
-            mu = checks.real("friction", by_wall.get(name, 0.0), least=0)
+            mu = checks.real("friction", given.get(name, 0.0), least=0)
             if mu and not isinstance(wall, HalfSpace):
                 refuse("friction", f"0 for {name!r}, which is no half-space", mu)
             if mu and isinstance(wall, HalfSpace):

@@ -1,6 +1,6 @@
 """Assemblies: many bodies of several kinds, each repeated."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -109,6 +109,8 @@ class Assembly(MechanicalSystem):
                 refuse("exits", "none in a system whose bodies have ties", dict(one.exits))
         object.__setattr__(self, "kinds", dict(kinds))
         object.__setattr__(self, "count", {name: int(count[name]) for name in kinds})
+        if not isinstance(self.ties, Sequence):
+            refuse("ties", "a sequence of ties", self.ties, TypeError)
         object.__setattr__(self, "ties", tuple(self.ties))
         self._order_pairs()
         _ = self.bodies

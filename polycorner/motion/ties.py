@@ -116,6 +116,8 @@ class Tie(Checked):
             found = as_expressions(argument, getattr(self, argument))
             object.__setattr__(self, argument, found)
         object.__setattr__(self, "potential", as_expression("potential", self.potential))
+        if not isinstance(self.friction, Sequence):
+            refuse("friction", "a sequence of laws of friction", self.friction, TypeError)
         object.__setattr__(self, "friction", tuple(self.friction))
         values = mapping("parameters", self.parameters).items()
         object.__setattr__(self, "parameters", {n: real("parameters", x) for n, x in values})

@@ -137,7 +137,7 @@ class PointsOnSphere(Checked, Described):
         """
         expected = f"finite vectors of shape ({self.count}, 3), none of them zero"
         given = checks.numbers("vectors", vectors, expected)
-        lengths = np.linalg.norm(given, axis=-1)
+        lengths = np.sqrt((given**2).sum(axis=-1)) if given.ndim else given
         if given.shape != (self.count, 3) or not np.isfinite(given).all() or not lengths.all():
             checks.refuse("vectors", expected, vectors)
         unit = given / lengths[:, None]
