@@ -39,7 +39,9 @@ class Vary(NamedTuple):
 @click.group(
     cls=LazyGroup,
     prefix="branches.",
-    epilog=examples("branches dyad --vary rod=2:2.95", "branches FILE.toml --vary load=0:1.5"),
+    epilog=examples(
+        "branches dyad --vary rod=2:2.95", "branches dyad --vary length=14:18 --loop --json"
+    ),
     no_args_is_help=True,
 )
 def branches() -> None:
