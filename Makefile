@@ -2,7 +2,8 @@
 
 PYTEST := .venv/bin/python -m pytest
 TIER := not slow
-NUMERICAL := $(addprefix tests/, polyhedra skeletons minimisation proofs bodies models motion spaces intervals)
+NUMERICAL := $(addprefix tests/, polyhedra skeletons minimisation proofs landscapes branches measures \
+    bodies models motion spaces intervals)
 
 .DEFAULT_GOAL := help
 .PHONY: help env env-pip dyad paper test wider costs disturbed cores thorough intermediate lint format types imports docs links bench trials constraints clean

@@ -188,8 +188,7 @@ class KindsInSpace(Scene):
             (p, q), touches, hulls = self.twins(one, two)
             n, listed = p.manifold.size, () if hulls is None else ((hulls, (p.name, q.name)),)
             placed = (replace(p, at=slice(n)), replace(q, at=slice(n, n + q.manifold.size)))
-            # It is not repeated.
-            pair = BodiesInSpace(placed, tuple(touches), (), frozenset(), 1, self.twins, listed)  # type: ignore[arg-type]
+            pair = BodiesInSpace(placed, tuple(touches), (), frozenset(), 1, _never, listed)
             self._met[one, two] = pair
         return self._met[one, two]
 
@@ -324,3 +323,8 @@ def _foot(p: Array, start: Array, end: Array) -> Array:
     along = end - start
     at = (p - start) @ along / (along @ along)
     return np.asarray(start + min(1.0, max(0.0, float(at))) * along)
+
+
+def _never() -> Twins:
+    """Stand for the twins of bodies that are not repeated."""
+    raise AssertionError

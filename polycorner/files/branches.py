@@ -10,7 +10,7 @@ import numpy as np
 from polycorner import checks
 from polycorner.branches import Arc, BranchEvent, BranchKind, Diagram
 from polycorner.container import JSON, FileKind, number
-from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read_polyhedron
+from polycorner.files.polyhedra import Entries, polyhedron_entry, read_problem
 from polycorner.forms import (
     Form,
     count,
@@ -133,17 +133,13 @@ def load_diagram(
         pose(polyhedron, energy)
     content = KIND.load_json(path)
     with KIND.reading(path):
-        entries({"problem": entries({})})("", content)
-        own, its = read_polyhedron(content["problem"])
-        chosen = own if polyhedron is None else polyhedron
-        differs = mismatch(content["problem"], chosen)
-        if not differs:
-            problem = pose(chosen, its if energy is None else energy)
+        problem, differs = read_problem(content, polyhedron, energy)
+        if problem is not None:
             differs = _lacking(content, problem)
-        if not differs:
+        if problem is not None and not differs:
             diagram = _read(content, problem)
             differs = next(_differences(diagram), "")
-    if differs:
+    if problem is None or differs:
         raise KIND.refusal(path, f"is of another polyhedron or energy: {differs}")
     return diagram
 

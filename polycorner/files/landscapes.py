@@ -9,7 +9,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.container import JSON, FileKind, number
-from polycorner.files.polyhedra import Entries, mismatch, polyhedron_entry, read_polyhedron
+from polycorner.files.polyhedra import Entries, polyhedron_entry, read_problem
 from polycorner.forms import count, entries, flag, made, many, optional, row, text, word
 from polycorner.forms import number as real
 from polycorner.kinds import checked
@@ -97,15 +97,11 @@ def load_landscape(
         pose(polyhedron, energy)
     content = KIND.load_json(path)
     with KIND.reading(path):
-        entries({"problem": entries({})})("", content)
-        own, its = read_polyhedron(content["problem"])
-        chosen = own if polyhedron is None else polyhedron
-        differs = mismatch(content["problem"], chosen)
-        if not differs:
-            problem = pose(chosen, its if energy is None else energy)
+        problem, differs = read_problem(content, polyhedron, energy)
+        if problem is not None:
             read = _read(content, problem)
             differs = next(_differences(read, problem), "")
-    if differs:
+    if problem is None or differs:
         raise KIND.refusal(path, f"is of another polyhedron or energy: {differs}")
     minima = tuple(Minimum(**_fields(Minimum, one)) for one in read["minima"])
     passes = tuple(Pass(**_fields(Pass, one)) for one in read["passes"])

@@ -10,6 +10,7 @@ from polycorner.files.formulas import formula_text, read_formula, symbols
 from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
+from polycorner.minimisation.problem import Problem, pose
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Manifold
@@ -128,6 +129,18 @@ def mismatch(entry: Entries, polyhedron: Polyhedron) -> str:
         if one != other:
             return f"{what}: written {_words(one)}, found {_words(other)}"
     return ""
+
+
+def read_problem(
+    content: Entries, polyhedron: Polyhedron | None, energy: Any
+) -> tuple[Problem | None, str]:
+    """Return the problem of a file, or how a polyhedron given instead differs; else nothing."""
+    forms.entries({"problem": forms.entries({})})("", content)
+    own, its = read_polyhedron(content["problem"])
+    chosen = own if polyhedron is None else polyhedron
+    if differs := mismatch(content["problem"], chosen):
+        return None, differs
+    return pose(chosen, its if energy is None else energy), ""
 
 
 def _words(values: Sequence[Any]) -> str:
