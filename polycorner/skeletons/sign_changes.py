@@ -55,14 +55,19 @@ def sign_change(
 ) -> tuple[float, Point]:
     """Return where a function changes sign on ``[0, far]``, by the Illinois method.
 
+    Where both ends have one sign, as by rounding, it is the end with the smaller value.
+
     ``enough``, of a point, the value there and the length of the interval that is left, may end
     the search before.
     """
     a, b = 0.0, far
-    (fa, _), (fb, at) = value(a), value(b)
+    (fa, start), (fb, at) = value(a), value(b)
     small = 1e-15 * max(abs(fa), abs(fb))
     if abs(fb) <= small:
         return b, at
+    # Rounding alone changes the sign of what is constant: nothing is looked for outside.
+    if fa != 0 and (fa > 0) == (fb > 0):
+        return (a, start) if abs(fa) < abs(fb) else (b, at)
     s, side = far, 0
     for _ in range(80):
         if b - a < 1e-15 or fb == fa:

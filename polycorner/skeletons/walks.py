@@ -15,6 +15,7 @@ from operator import attrgetter
 import numpy as np
 
 from polycorner.polyhedra.faces import HeldPoint, projected
+from polycorner.polyhedra.steppers import Stepper
 from polycorner.skeletons.sign_changes import may_vanish, sign_change
 from polycorner.skeletons.singularities import (
     SingularPoint,
@@ -96,7 +97,7 @@ def follow(
     return _Follower(start, direction, passive, home=home, extent=extent).run()
 
 
-class _Follower:
+class _Follower(Stepper[HeldPoint]):
     """The state of one walk."""
 
     def __init__(
@@ -104,10 +105,9 @@ class _Follower:
         *, home: bool, extent: float | None,
     ) -> None:  # fmt: skip
         self.quotient = quotient = start.quotient
-        self.scales, self.options = quotient.scales, quotient.options
-        self.point, self.t = start, start.tangent(direction)
-        self.out, self.bend = self.t, np.zeros(len(self.t))
-        self.start, self.home = start, home
+        super().__init__(start, start.tangent(direction), quotient.options, quotient.scales)
+        self.scales, self.out = quotient.scales, self.t
+        self.start, self.home, self.blocked = start, home, False
         self.extent = quotient.extent if extent is None else extent
         held = passive.union(start.kept)
         self.watched = np.array([i for i in range(quotient.count) if i not in held], dtype=np.int64)
@@ -116,7 +116,7 @@ class _Follower:
         self.union = quotient.polyhedron.is_union
         negative = self.union & (start.values[self.watched] < 0)
         self.signs = np.where(negative, -1.0, 1.0)
-        self.points, self.length, self.side = [start.q], 0.0, start.orientation(self.t)
+        self.side = start.orientation(self.t)
         self.expected: SingularPoint | None = None
 
     def run(self) -> Walk:
@@ -135,19 +135,35 @@ class _Follower:
                 if first[0].active() is None and h > self.options.shortest_step and not self.union:
                     h /= 2  # several functions close where curves cross: on another of these
                     continue
-                self._move(*first)
+                self.move(*first)
                 return self._walk(End.CORNER)
             back = self._return(point) if self.home else None
             if back is not None:
-                self._move(*back)
+                self.move(*back)
                 return self._walk(End.CLOSED)
-            self._move(point, t)
+            self.move(point, t)
             # A passive function off zero shows that the curve is lost.
             if any(abs(point.distances[self.passive]) > self.quotient.tolerances.same):
                 return self._walk(End.SINGULAR)
             if self.length > self.extent:
                 return self._walk(End.INFINITY)
-            h = min(1.6 * h, self._longest())
+            h = self.next_step(h, self._longest())
+
+    def place(self, point: HeldPoint) -> Array:
+        """Return its coordinates."""
+        return point.q
+
+    def corrected(self, x: Array, across: Array, reach: float) -> HeldPoint | None:  # noqa: ARG002 - the shortest way is across
+        """Return the nearest point of the face."""
+        point = projected(self.quotient, x, self.point.kept, reach)
+        if point is None:
+            self.blocked |= not HeldPoint(self.quotient, x, self.point.kept).finite
+        return point
+
+    def move(self, point: HeldPoint, t: Array, *, bends: bool = True) -> None:
+        """Go on to a point."""
+        super().move(point, t, bends=bends and point.is_curve)
+        self.side = point.orientation(t)
 
     def _longest(self) -> float:
         """Return the longest step: longer far out, short on small circles and where it turns."""
@@ -156,45 +172,26 @@ class _Follower:
         manifold = self.quotient.manifold
         turning = abs(self.t * manifold.scale_array / np.array(manifold.periods)).max()
         circle = 0.05 / turning if turning > 0 else math.inf
-        longest, turn = self.options.longest_step, self.options.turn
-        far = min(room / 2, longest * (1 + self.length / 20), circle)
-        return min(max(longest, far), 0.8 * turn / max(float(np.linalg.norm(self.bend)), 1e-3))
+        longest = self.options.longest_step
+        return max(longest, min(room / 2, longest * (1 + self.length / 20), circle))
 
     def _walk(self, end: End) -> Walk:
-        return Walk(np.array(self.points), self.point, self.t, end, self.length)
-
-    def _move(self, point: HeldPoint, t: Array) -> None:
-        chord = self._chord(point)
-        self.length += chord
-        self.bend = (t - self.t) / chord if point.is_curve and chord > 0 else self.bend
-        self.point, self.t = point, t
-        self.side = point.orientation(t)
-        self.points.append(point.q)
+        points = np.array([point.q for point in self.passed])
+        return Walk(points, self.point, self.t, end, self.length)
 
     def _step(self, h: float) -> tuple[HeldPoint, Array, float] | End:
         """Return the next point, the tangent there and the step that was accepted."""
-        blocked = False
-        while h > self.options.shortest_step:
-            ahead = self.point.q + h * self.scales * (self.t + h / 2 * self.bend)
-            point = projected(self.quotient, ahead, self.point.kept, 0.3 * h)
-            if point is None:
-                blocked |= not HeldPoint(self.quotient, ahead, self.point.kept).finite
-            else:
-                t = point.tangent(self.t)
-                turn = math.acos(min(1.0, float(t @ self.t)))
-                off = (point.q - self.point.q) / self.scales - h * self.t
-                # A larger deviation than the turn explains: another curve of the same functions.
-                strayed = float(np.linalg.norm(off)) > h * (0.75 * turn + self.options.stray)
-                flipped = point.orientation(t) * self.side < 0
-                if flipped and self._dependent(point) is not None:
-                    return point, t, h
-                # After a short step the walk did not jump to another curve.
-                if flipped and h < self.quotient.tolerances.beside:
-                    return End.SINGULAR
-                if turn < self.options.turn and not strayed and not flipped:
-                    return point, t, h
-            h /= 2
-        return End.CHART if blocked else End.SINGULAR
+        self.blocked = False
+        for point, t, tried, fits in self.trials(h):
+            flipped = point.orientation(t) * self.side < 0
+            if flipped and self._dependent(point) is not None:
+                return point, t, tried
+            # After a short step the walk did not jump to another curve.
+            if flipped and tried < self.quotient.tolerances.beside:
+                return End.SINGULAR
+            if fits and not flipped:
+                return point, t, tried
+        return End.CHART if self.blocked else End.SINGULAR
 
     def _stopped(self, end: End) -> Walk:
         """Return the walk where no step is possible: a tip where one is found within reach."""
@@ -204,7 +201,7 @@ class _Follower:
             tip = SingularPoint(self.quotient, self.point.q, self.point.kept)  # where roots end
         if tip is None or tip.active() is None:
             return self._walk(end)
-        self._move(tip, self.t)
+        self.move(tip, self.t)
         return self._walk(End.CORNER)
 
     def _dependent(self, point: HeldPoint) -> tuple[HeldPoint, Array] | None:
@@ -214,34 +211,22 @@ class _Follower:
         found beyond the step is kept for the next.
         """
         ends = [self.point, point]
-        if len(self.points) == 1:
-            ends.insert(1, self._between(point, 0.5))
+        if len(self.passed) == 1:
+            ends.insert(1, self.between(point, 0.5))
         volume = attrgetter("volume")
         low, high = min(ends, key=volume), max(ends, key=volume)
         flipped = point.orientation(self.t) * self.side < 0
         if low.volume < COLLAPSE * high.volume or flipped:
-            reach = 2 * self._chord(point)
+            reach = 2 * self.chord(point)
             self.expected = singular_point(self.quotient, low.q, self.point.kept, reach)
         found = dependent_between(self.point, point, self.expected)
         return None if found is None else (found, self.t)
-
-    def _between(self, other: HeldPoint, s: float) -> HeldPoint:
-        """Return the point of the set a fraction ``s`` of the way to ``other``."""
-        point = projected(self.quotient, self._guess(other, s), self.point.kept, math.inf)
-        return other if point is None else point
-
-    def _guess(self, other: HeldPoint, s: float) -> Array:
-        """Return a point of the cubic through both ends with their tangents."""
-        chord = other.q - self.point.q
-        h = self._chord(other) * self.scales
-        out, back = h * self.t - chord, h * other.tangent(self.t) - chord
-        return np.asarray(self.point.q + s * (chord + (1 - s) * ((1 - s) * out - s * back)))
 
     def _event(self, point: HeldPoint, t: Array) -> tuple[HeldPoint, Array] | None:
         """Return the first point where the face changes, and the tangent there; cut the step."""
         event: tuple[HeldPoint, Array] | None = None
         crossed: dict[int, HeldPoint | None] = {}
-        while self._chord(point) > 0:
+        while self.chord(point) > 0:
             ahead = [found for found in self._suspects(point, t) if found[0] not in crossed]
             if not ahead:
                 break
@@ -251,7 +236,7 @@ class _Follower:
             if where is not None and self._matters(where):
                 point, t = event = where, where.tangent(self.t)
         for j, where in crossed.items():
-            if where is not None and self._chord(where) < self._chord(point):
+            if where is not None and self.chord(where) < self.chord(point):
                 self.signs[self.watched == j] *= -1
         return event
 
@@ -269,13 +254,10 @@ class _Follower:
         f0, f1 = self.signs * here.values[rows], self.signs * there.values[rows]
         slope0 = self.signs * (here.gradients[rows] @ self.t)
         slope1 = self.signs * (there.gradients[rows] @ t)
-        reach = np.maximum(here.sizes[rows], there.sizes[rows]) * self._chord(point)
-        found = may_vanish((f0, f1), (slope0, slope1), reach, self._chord(point))
+        reach = np.maximum(here.sizes[rows], there.sizes[rows]) * self.chord(point)
+        found = may_vanish((f0, f1), (slope0, slope1), reach, self.chord(point))
         found.sort(key=lambda k: f0[k] / (f0[k] - f1[k]) if f1[k] < 0 < f0[k] else f1[k] >= 0)
         return [(int(rows[k]), float(self.signs[k])) for k in found]
-
-    def _chord(self, point: HeldPoint) -> float:
-        return float(np.linalg.norm((point.q - self.point.q) / self.scales))
 
     def _closing(self, point: HeldPoint, j: int, sign: float) -> tuple[HeldPoint, bool] | None:
         """Return where function ``j`` first reaches zero, and whether it crosses.
@@ -287,13 +269,13 @@ class _Follower:
         if sign * point.values[j] >= 0:
 
             def slope(s: float) -> tuple[float, HeldPoint]:
-                at = self._between(point, s)
+                at = self.between(point, s)
                 return sign * float(at.gradients[j] @ at.tangent(self.t)), at
 
             narrow = 1e-3  # part of a step in which the slope bounds how far a function may fall
 
             def is_clear(at: HeldPoint, rate: float, part: float) -> bool:
-                fall = 2 * abs(rate) * part * self._chord(point)
+                fall = 2 * abs(rate) * part * self.chord(point)
                 size = zero * at.sizes[j]
                 return part < narrow and bool(sign * at.values[j] - fall > size)
 
@@ -305,7 +287,7 @@ class _Follower:
                 return end, False
 
         def value(s: float) -> tuple[float, HeldPoint]:
-            at = self._between(point, s)
+            at = self.between(point, s)
             return sign * float(at.values[j]), at
 
         quick = self._crossing(point, j) if end is point and self.point.is_curve else None
@@ -314,9 +296,9 @@ class _Follower:
     def _crossing(self, point: HeldPoint, j: int) -> HeldPoint | None:
         """Return where ``j`` crosses zero, by Newton's method; None if that leaves the step."""
         f0, f1 = self.point.values[j], point.values[j]
-        guess = self._guess(point, f0 / (f0 - f1))
+        guess = self.guess(point, f0 / (f0 - f1))
         kept = [*self.point.kept, j]
-        record = projected(self.quotient, guess, kept, self._chord(point))
+        record = projected(self.quotient, guess, kept, self.chord(point))
         if record is None or record.condition < 1e-3:
             return None
         chord = (point.q - self.point.q) / self.scales
@@ -327,12 +309,12 @@ class _Follower:
         """Return where this step passes the start of the walk again, and the tangent there."""
         tolerances = self.quotient.tolerances
         near = 2 * self.quotient.separation(point.q, self.point.q)
-        if self.length < 2 * self._chord(point) or abs(self._from_home(point.q)).max() > near:
+        if self.length < 2 * self.chord(point) or abs(self._from_home(point.q)).max() > near:
             return None
         ahead = self._from_home(self.start.q + tolerances.difference * self.scales * self.out)
 
         def passed(s: float) -> tuple[float, HeldPoint]:
-            at = self._between(point, s)
+            at = self.between(point, s)
             return float(self._from_home(at.q) @ ahead), at
 
         if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:

@@ -1,11 +1,12 @@
 """Dips of a function along a step, against the cubic itself."""
 
 import numpy as np
+import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
-from polycorner.skeletons.sign_changes import dips
+from polycorner.skeletons.sign_changes import dips, sign_change
 
 heights, slopes = st.floats(1e-3, 10), st.floats(0, 100)
 
@@ -38,3 +39,17 @@ def test_every_cubic_has_an_answer_without_a_warning(f0, fall, turn, bend, size)
     with np.errstate(all="raise"):
         assert dips(*exact, 1.0) == (lowest < 0.25 * min(f0, f1))
         assert dips(*scaled, 1.0) in {True, False}
+
+
+@pytest.mark.parametrize(
+    ("ends", "least"), [((-3e-16, -2e-16), 1.0), ((2e-16, 3e-16), 0.0), ((-1e-16, -1e-16), 1.0)]
+)
+def test_where_no_sign_changes_nothing_is_looked_for_outside(ends, least):
+    tried = []
+
+    def noise(s):
+        tried.append(s)
+        return ends[0] + s * (ends[1] - ends[0]), s
+
+    assert sign_change(noise) == (least, least)
+    assert all(0 <= s <= 1 for s in tried)
