@@ -153,9 +153,6 @@ class Arrangement(Checked, Printed):
         for argument, several in (("bodies", self.named), ("fixed", self.fixed)):
             for body in several.values():
                 checks.instance(argument, body, Body, "disc(1.0)")
-        for wall in self.walls.values():
-            if not isinstance(wall, Wall):
-                refuse("walls", "half-spaces and cylinders", wall, TypeError)
         checks.instance("unit", self.unit, str)
         checks.choice("orientations", self.orientations, ORIENTATIONS)
         object.__setattr__(self, "joints", dict(checks.mapping("joints", self.joints)))

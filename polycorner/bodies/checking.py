@@ -32,7 +32,13 @@ def check_together(
     walls: Mapping[str, Wall],
     joints: Iterable[str] = (),
 ) -> None:
-    """Raise ValueError for a name of two things, or things in the plane and in space."""
+    """Raise ValueError for a name of two things, or things in the plane and in space.
+
+    TypeError for walls that are none.
+    """
+    for wall in walls.values():
+        if not isinstance(wall, Wall):
+            refuse("walls", "half-spaces and cylinders", wall, TypeError)
     known = [*bodies, *fixed, *walls, *joints]
     twice = sorted({name for name in known if known.count(name) > 1})
     if twice:

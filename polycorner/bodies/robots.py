@@ -120,9 +120,6 @@ class Robot(Checked):
                 checks.instance(f"{argument}: {name}", value, kind)
                 if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
                     refuse(argument, "names of letters, digits and _", name)
-        for wall in self.walls.values():
-            if not isinstance(wall, Wall):
-                refuse("walls", "half-spaces and cylinders", wall, TypeError)
         known = {
             n: link.body or Body({"": Part(np.zeros((1, 3)), 1.0)})
             for n, link in self.links.items()
