@@ -253,6 +253,17 @@ Found = tuple[float, FritzJohn, Stop | None]  # part of the way, a point, what i
 
 
 class _ArcContinuation(_Continuation[FritzJohn]):
+    def _event(self, point: FritzJohn, t: Array) -> tuple[FritzJohn, Stop | None] | None:
+        event = super()._event(point, t)
+        if event is None or event[1] is not Stop.EVENT:
+            return event
+        at = event[0]
+        if self.chord(at) > self.system.tolerances.same:
+            before = self._first_flat(at, at.tangent(self.t))
+            if before is not None and before[2] is None:
+                return at, None  # on the shorter way more is seen
+        return event
+
     def _flat(self, point: FritzJohn, t: Array) -> list[Found]:
         """Return where a curvature vanishes or the parameter turns back on the way to a point."""
         found = self._first_flat(point, t)
@@ -271,9 +282,10 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         change, h = point.s - self.point.s, self.chord(point)
         if len(self.passed) == 1 and (abs(before) <= beside or self.point.definite <= beside / 10):
             # It leaves a fold or a branch point: signs are those beyond.
+            # The second step is looked at as all others are; the first one is short.
             turned = after * change < 0 and abs(after) > self.system.tolerances.same
-            again = turned or not self._is_steady(point, 0.25 ** np.arange(1.0, 5.0), point.index)
-            return several if again and h > beside else None
+            again = turned or not self._is_steady(point, (1 / 16, 1 / 4), point.index)
+            return several if h > (beside if again else self.options.tip) else None
         # Where a corner stays and multipliers move, the parameter's change is rounding.
         moves = max(abs(before), abs(after)) > self.system.tolerances.same
         if before * after < 0 and moves:

@@ -172,8 +172,10 @@ def enclosed_arc(
         k = len(course) // 2
         if len(course) > 2 and len(tubes) < options.most_tubes:
             waiting += [course[k:], course[: k + 1]]
-        elif not tubes and waiting:
+        elif (missed or not tubes) and waiting:
             missed = f"up to {_time(system, two):.6g}: {ways}"
+            tubes.clear()
+            flags.clear()
         else:
             return result(
                 (not missed, False), f"{missed or f'from {_time(system, one):.6g} on: {ways}'}"

@@ -139,14 +139,14 @@ class _BranchSearch:
         n, same = self.system.n, self.system.tolerances.same
         for k, edge in enumerate(self.edges):
             one, two = edge.ends
-            if (
-                len(edge.points) == 1 and one == two
-            ):  # on which no step was possible: a note says so
+            places = np.array([p.x[: n + 1] for p in edge.points])
+            extent = np.ptp(places, axis=0).max()
+            if one == two >= 0 and extent <= self.system.tolerances.near:
+                # No step was possible, or only such that led nowhere: a note says so.
                 self.nodes[one].arms = [arm for arm in self.nodes[one].arms if arm.arc != k]
                 edge.points = []
                 continue
-            places = np.array([p.x[: n + 1] for p in edge.points])
-            if min(one, two) < 0 or one == two or np.ptp(places, axis=0).max() > same:
+            if min(one, two) < 0 or one == two or extent > same:
                 continue
             kept, gone = self.nodes[one], self.nodes[two]
             kept.kind = gone.kind if kept.kind is TOLD else kept.kind

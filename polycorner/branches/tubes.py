@@ -431,7 +431,11 @@ def joined(one: Tube, two: Tube, at: Array, bits: int) -> bool:
     """Whether two tubes are pieces of one curve, run through in the same sense near a point."""
     system = one.system.pinned(one.system.normal, at.tolist())
     shared = point(system, [ball(x) for x in at.tolist()], bits)
-    if isinstance(shared, Undecided) or one.velocity is None:
+    if isinstance(shared, Undecided):
         return False
-    onwards = dot(two.system.normal, one.velocity)
+    # On a whole tube near a branch point the derivative's enclosure is too wide to have a sign.
+    velocity = Tube(shared).velocity
+    if velocity is None:
+        return False
+    onwards = dot(two.system.normal, velocity)
     return one.contains(shared.solution) and two.contains(shared.solution) and bool(onwards > 0)
