@@ -312,8 +312,9 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         """
         # Else there is another event before.
         parts = (s / 2, 7 * s / 8, 0.999 * s)
-        if self.chord(point) > self.system.tolerances.beside and not self._is_steady(
-            point, parts, self.point.index
+        if self.chord(point) > self.system.tolerances.beside and not (
+            self._is_steady(point, parts, self.point.index)
+            and self._only_one_vanishes(self._between(point, parts[-1]))
         ):
             return 0.5, point, None
         if at.is_fold(self.t):
@@ -369,15 +370,25 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         one, two = self.point.falling, point.falling
         return bool(np.linalg.svd(one @ two.T, compute_uv=False).min(initial=1.0) > 0.5)
 
-    def _dips(self, point: FritzJohn, t: Array) -> bool:
-        """Whether a curvature may have touched zero on the way to a point.
+    def _only_one_vanishes(self, at: FritzJohn) -> bool:
+        """Whether none but the curvature that vanishes just beyond a point may have before."""
+        curvatures = at.curvatures()
+        few = self.system.is_sparse or len(curvatures) < 2
+        if few or self.chord(at) <= self.system.tolerances.beside:
+            return True
+        return not self._dips(at, at.tangent(self.t), besides=int(np.argmin(abs(curvatures))))
+
+    def _dips(self, point: FritzJohn, t: Array, besides: int | None = None) -> bool:
+        """Whether a curvature may have touched zero on the way to a point, ``besides`` one.
 
         That is so where a step has jumped from one curve through a branch point to another.
         """
         h, low = self.chord(point), self.point.curvatures()
         side, high = np.where(low < 0, -1.0, 1.0), point.curvatures()
-        f0, f1 = side * low, side * high
-        out, back = side * self._bending(self.point, self.t) * h, side * self._bending(point, t) * h
+        bends = self._bending(self.point, self.t), self._bending(point, t)
+        f0, f1, out, back = (side * x for x in (low, high, h * bends[0], h * bends[1]))
+        if besides is not None:
+            f0, f1, out, back = (np.delete(x, besides) for x in (f0, f1, out, back))
         # Tangents show corners of the graph, and curvatures may change their order on the way.
         # They are followed half as far again, as the step may end just beyond the branch point.
         falls, rises = (out < 0) & (f0 + 1.5 * out < 0), (back > 0) & (f1 - 1.5 * back < 0)
