@@ -258,7 +258,9 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         if event is None or event[1] is not Stop.EVENT:
             return event
         at = event[0]
-        if self.chord(at) > self.system.tolerances.same:
+        # Where gradients are dependent the face has a direction more.
+        alike = len(at.curvatures()) == len(self.point.curvatures())
+        if alike and self.chord(at) > self.system.tolerances.same:
             before = self._first_flat(at, at.tangent(self.t))
             if before is not None and before[2] is None:
                 return at, None  # on the shorter way more is seen
