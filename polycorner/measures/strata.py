@@ -87,12 +87,15 @@ class StrataMeasures(Checked, Printed):
 
     @cached_property
     def sticky_corners(self) -> Array:
-        """Weights of the corners with stickiness; in the limit only those with most contacts."""
-        parts = self.skeleton.corners
+        """Weights of the corners with stickiness; in the limit only those with most contacts.
+
+        Of corners with a weight.
+        """
+        parts, known = self.skeleton.corners, ~np.isnan(self.corners)
         sticky = np.array([self._factors(corner.active) for corner in parts])
-        if self.weighting.is_limit and len(parts):
+        if self.weighting.is_limit and known.any():
             counts = np.array([len(corner.active) for corner in parts])
-            sticky = sticky * (counts == counts.max())
+            sticky = sticky * (counts == counts[known].max())
         return np.asarray(self.corners * sticky)
 
     @cached_property
