@@ -39,11 +39,16 @@ def measure() -> None:
 
 
 def weighting_options(function: Command) -> Command:
-    """Add ``--stickiness`` and ``--diffusion``."""
+    """Add ``--stickiness``, ``--stiffness``, ``--diffusion`` and ``--faces``."""
     stickiness = option(
         "--stickiness", type=click.FloatRange(min=0, min_open=True), default=math.inf,
         group="Measure",
         help="Factor of a contact, in the units of its function; with a finite one rates are told.",
+    )  # fmt: skip
+    stiffness = option(
+        "--stiffness", type=click.FloatRange(min=0, min_open=True), default=None, group="Measure",
+        help="Second derivative of U / T at the bottom of a contact's well: weighs singular corners"
+        " and those with more contacts than dimensions, too.",
     )  # fmt: skip
     diffusion = option(
         "--diffusion", type=click.FloatRange(min=0, min_open=True), default=1.0, group="Measure",
@@ -53,7 +58,7 @@ def weighting_options(function: Command) -> Command:
         "--faces", type=click.IntRange(0, 10**8), default=0, group="Measure",
         help="Points of each of four chains that weigh the faces, too; 0 for none.",
     )  # fmt: skip
-    return stickiness(diffusion(faces(function)))
+    return stickiness(stiffness(diffusion(faces(function))))
 
 
 @measure.command(
@@ -114,12 +119,14 @@ def weigh(
     energy: Any = None,
     *,
     stickiness: float,
+    stiffness: float | None,
     diffusion: float,
     faces: int,
 ) -> None:
     """Weigh a skeleton and report it."""
-    for name, value in (("stickiness", stickiness), ("diffusion", diffusion)):
-        if math.isnan(value):
+    given = {"stickiness": stickiness, "stiffness": stiffness, "diffusion": diffusion}
+    for name, value in given.items():
+        if value is not None and math.isnan(value):
             fail(f"--{name}: expected a number above 0; got nan")
     with working("measuring", "edges") as progress:
         import numpy as np
@@ -127,7 +134,7 @@ def weigh(
         from polycorner.measures import Weighting, face_weights, measure, rates
 
         try:
-            weighting = Weighting(stickiness=stickiness, energy=energy)
+            weighting = Weighting(stickiness=stickiness, stiffness=stiffness, energy=energy)
             measured = measure(found, weighting=weighting, progress=progress)
             rng = np.random.default_rng(search.seed)
             weighed = face_weights(measured, points=faces, rng=rng) if faces else None
@@ -143,8 +150,8 @@ def weigh(
         row["error"] = _known(away)
     answer["parameters"] = {
         **answer["parameters"],
+        **given,
         "stickiness": None if math.isinf(stickiness) else stickiness,
-        "diffusion": diffusion,
     }
     answer["partition"] = {str(d): z for d, z in measured.partition.items()}
     answer["notes"] += measured.notes
@@ -155,14 +162,19 @@ def weigh(
     answer["rates"] = None
     if not math.isinf(stickiness) and not np.isnan(measured.corners).any():
         answer["rates"] = rates(measured, diffusion=diffusion).matrix.tolist()
-    search.finish(answer, lambda folder: draw(folder, answer["corners"]), _sheet, "measure.json")
+    search.finish(
+        answer,
+        lambda folder: draw(folder, answer["corners"]),
+        partial(_sheet, measured.balance),
+        "measure.json",
+    )
 
 
 def _known(value: float) -> float | None:
     return None if math.isnan(value) else float(value)
 
 
-def _sheet(answer: dict[str, Any]) -> "Sheet":
+def _sheet(balance: str, answer: dict[str, Any]) -> "Sheet":
     from polycorner.printing import Sheet, Table, number
 
     def told(value: float | None) -> str:
@@ -188,8 +200,7 @@ def _sheet(answer: dict[str, Any]) -> "Sheet":
         )
         columns = tuple(range(1, len(names) + 1))
         parts.append(Table(("rate from", *names), matrix, columns))
-    weights = ", ".join(f"{told(z)} of dimension {d}" for d, z in answer["partition"].items())
-    parts.append(f"sums of weights: {weights}")
+    parts.append(balance)
     if answer["faces_weight"] is not None:
         total = answer["faces_weight"]
         parts.append(

@@ -38,7 +38,9 @@ At a corner nothing is left to integrate: ``Z = sqrt(det T T^T) / (|S| |det(A; t
 orthonormal basis of the orbit's directions ([HGB], [MABM]).
 
 **Where this ends.**  Gradients that are dependent at a point, or on a stratum, make ``Z`` infinite
-in the limit; the weight then depends on the shape of the well ([KHC]).  Such strata are declined.
+in the limit; the weight then depends on the shape of the well ([KHC]).  Corners of this kind have
+a weight where wells are harmonic, with a given stiffness (:mod:`polycorner.measures.wells`), and
+are declined otherwise; edges of this kind are always declined.
 """
 
 import lazy_loader

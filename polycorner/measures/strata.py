@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from polycorner import checks
 from polycorner.kinds import checked
-from polycorner.measures.weighting import LIMIT, Weighting, densities, factors
+from polycorner.measures.weighting import LIMIT, Weighting, boltzmann, densities, factors
+from polycorner.measures.wells import confined
 from polycorner.polyhedra.quotients import Quotient
-from polycorner.printing import Printed, Sheet, facts, listed, names, number
+from polycorner.printing import Printed, Sheet, listed, names, number
 from polycorner.progress import Progress, silent
 from polycorner.skeletons.elements import Skeleton, corner_name
 from polycorner.skeletons.parts import Arcs, Corner, Edge
@@ -117,6 +118,23 @@ class StrataMeasures(Checked, Printed):
         """Sums of the weights by dimension, with stickiness; what was declined is left out."""
         return {0: float(np.nansum(self.sticky_corners)), 1: float(np.nansum(self.sticky_edges))}
 
+    @property
+    def balance(self) -> str:
+        """How corners and edges share the weight, in sentences."""
+        corners, edges = self.partition.values()
+        if not self.weighting.is_limit:
+            total = corners + edges or 1.0
+            shares = (number(part / total, 6) for part in (corners, edges))
+            return "Corners have {} of the weight of corners and edges, edges {}.".format(*shares)
+        limit = "In the sticky limit corners with the most contacts have all the weight."
+        known, loose = ~np.isnan(self.corners), float(np.nansum(self.edges))
+        most = {len(self.skeleton.corners[k].active) for k in np.flatnonzero(known)}
+        fewer = {len(edge.active) + 1 for edge in self.skeleton.edges}
+        if most != fewer or len(most) != 1 or not corners or not loose:
+            return limit
+        ratio = number(loose / corners, 6)
+        return f"{limit}  With a stickiness K edges are met {ratio} / K times as often as they are."
+
     def _sheet(self) -> Sheet:
         corners = zip(
             self.skeleton.corners, self.corners, self.corner_orders, self.probabilities, strict=True
@@ -138,8 +156,8 @@ class StrataMeasures(Checked, Printed):
             listed("Corners", head, told, len(self.corners), (2, 3, 4)),
             listed("Edges", second, rows, len(self.edges), (2, 3, 4)),
         )
-        sums = facts((f"dimension {d}", number(z, 9)) for d, z in self.partition.items())
-        return Sheet("Measures of strata", (*parts, sums, *(f"Note: {n}" for n in self.notes)))
+        notes = (f"Note: {n}" for n in self.notes)
+        return Sheet("Measures of strata", (*parts, self.balance, *notes))
 
 
 @checked
@@ -170,9 +188,9 @@ def measure(
     Returns
     -------
     StrataMeasures
-        Corners with more contacts than dimensions, singular ones and edges along which gradients
-        are dependent have no weight of their own in the limit and are declined, unless surface
-        measure is asked for.
+        Corners with more contacts than dimensions and singular ones outweigh all others in the
+        limit; they are declined unless the weighting has a stiffness or asks for surface measure.
+        So are edges along which gradients are dependent, whatever the stiffness.
 
     Raises
     ------
@@ -243,15 +261,22 @@ class _Measuring:
 
     def corner(self, k: int, corner: Corner) -> tuple[int, float]:
         """Return the symmetry number and the weight of a corner."""
-        order, rows = self.order(corner.point), self.rows(corner.active)
-        if self.weighting.gradients and (
-            corner.singular or len(self.quotient.at(corner.point).basis(rows)) < len(rows)
+        order, rows, q = self.order(corner.point), self.rows(corner.active), corner.point
+        if not self.weighting.gradients or not (
+            corner.singular or len(self.quotient.at(q).basis(rows)) < len(rows)
         ):
+            return order, float(densities(self.weighting, self.quotient, rows, q[None])[0]) / order
+        stiffness = self.weighting.stiffness
+        if stiffness is None:
             why = "is singular" if corner.singular else "has more contacts than dimensions"
-            self.notes.append(f"{corner_name(k)} {why}, and was declined")
+            self.notes.append(f"{corner_name(k)} {why}, and was declined: give a stiffness")
             return order, math.nan
-        density = densities(self.weighting, self.quotient, rows, corner.point[None])
-        return order, float(density[0]) / order
+        weight = confined(self.quotient, rows, q, stiffness, self.tolerance)
+        if math.isnan(weight):
+            why = "is not rigid to second order, or has more than two flexes"
+            self.notes.append(f"{corner_name(k)} {why}, and was declined")
+        factor = float(boltzmann(self.weighting, self.quotient.polyhedron, q[None])[0])
+        return order, weight * factor / order
 
     def edge(self, k: int, edge: Edge) -> tuple[int, EdgeIntegrals]:
         """Return the symmetry number and the integrals of an edge."""

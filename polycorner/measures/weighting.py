@@ -35,12 +35,16 @@ class Weighting(Checked):
         Its Boltzmann factor ``exp(-E / temperature)`` weighs points.
     temperature : float
         In the units of the energy.
+    stiffness : float, optional
+        Second derivative over temperature of every contact's well at its minimum, in inverse
+        squared units of the functions.  Only corners whose gradients are dependent need it.
     """
 
     stickiness: float | Mapping[str, float] = 1.0
     gradients: bool = True
     energy: Any = None
     temperature: float = 1.0
+    stiffness: float | None = None
 
     def __post_init__(self) -> None:
         given = self.stickiness
@@ -50,6 +54,8 @@ class Weighting(Checked):
         else:
             checks.real("stickiness", given, above=0, infinite=True)
         checks.real("temperature", self.temperature, above=0)
+        if self.stiffness is not None:
+            checks.real("stiffness", self.stiffness, above=0)
         if self.energy is not None and not isinstance(self.energy, SmoothFunction):
             as_expression("energy", self.energy)
         super().__post_init__()
@@ -100,10 +106,15 @@ def densities(
         sections = _volumes(scaled[:, list(quotient.equations)])
         with np.errstate(divide="ignore"):
             density = density * sections / _volumes(scaled[:, quotient.held(rows)])
-    energy = posed(weighting, quotient.polyhedron)
-    if energy is not None:
-        density = density * np.exp(-energy.value(points) / weighting.temperature)
-    return density
+    return density * boltzmann(weighting, quotient.polyhedron, points)
+
+
+def boltzmann(weighting: Weighting, polyhedron: Polyhedron, points: Array) -> Array:
+    """Return the factor of the energy at points ``(k, n)``, ``(k,)``."""
+    energy = posed(weighting, polyhedron)
+    if energy is None:
+        return np.ones(len(points))
+    return np.asarray(np.exp(-energy.value(points) / weighting.temperature))
 
 
 def _volumes(rows: Array) -> Array:

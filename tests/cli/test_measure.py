@@ -16,6 +16,9 @@ def test_the_octahedron_has_four_percent(capsys, tmp_path):
     assert code == 0
     assert "0.96" in printed
     assert "0.04" in printed
+    assert "With a stickiness K edges are met 14.2039 / K times as often" in " ".join(
+        printed.split()
+    )
     found = json.loads((out / "measure.json").read_text())
     shares = {row["symmetry_number"]: row["probability"] for row in found["corners"]}
     assert shares == pytest.approx({4: 0.96, 48: 0.04}, abs=1e-9)
@@ -35,6 +38,19 @@ def test_rates_of_discs_balance(capsys):
     assert np.allclose(found["rates"], 2 * np.array(half["rates"]))
 
 
+def test_a_hexagon_of_discs_has_a_share_with_a_stiffness(capsys):
+    """Of seven discs it alone has twelve contacts, for eleven coordinates."""
+    options = ("spheres", "--count", "7", "--dimension", "2", "--stickiness", "100")
+    code, printed, _ = commands.run(capsys, "measure", *options)
+    assert code == 0
+    assert "C3 has more contacts than dimensions, and was declined" in printed
+    assert "of the weight of corners and edges" in " ".join(printed.split())
+    found = commands.answer(capsys, "measure", *options, "--stiffness", "1e4")
+    shares = {len(row["active"]): row["probability"] for row in found["corners"]}
+    assert shares[12] > 0.9
+    assert np.isfinite(found["rates"]).all()
+
+
 def test_a_region_in_a_file_weighed_with_its_faces(capsys, tmp_path):
     """``E = y`` on ``x^2 <= y <= 1``: the lid ``2 / e``, the area ``int exp(-y) 2 sqrt(y) dy``."""
     path = tmp_path / "bowl.toml"
@@ -51,4 +67,4 @@ def test_a_region_in_a_file_weighed_with_its_faces(capsys, tmp_path):
     assert abs(total["value"] - area) < 4 * total["error"] < 0.1
     code, printed, _ = commands.run(capsys, "measure", str(path))
     assert code == 0
-    assert "sums of weights" in printed
+    assert "In the sticky limit corners with the most contacts have all the weight." in printed
