@@ -15,6 +15,7 @@ from polycorner.cli.problems import inner_starts, read, with_problem
 from polycorner.cli.search import RESUMING, Begin, SkeletonSearch, search_options
 
 if TYPE_CHECKING:
+    from polycorner.measures.estimates import Estimate
     from polycorner.printing import Sheet
     from polycorner.skeletons.elements import Skeleton
 
@@ -157,8 +158,9 @@ def weigh(
     answer["notes"] += measured.notes
     answer["faces_weight"] = None
     if weighed is not None:
-        total = weighed.total
-        answer["faces_weight"] = {"value": total.value, "error": total.error}
+        answer["faces_weight"] = _estimate(weighed.total)
+        for row, one in zip(answer["faces"], weighed.by_face, strict=True):
+            row["weight"] = None if one is None else _estimate(one)
     answer["rates"] = None
     if not math.isinf(stickiness) and not np.isnan(measured.corners).any():
         answer["rates"] = rates(measured, diffusion=diffusion).matrix.tolist()
@@ -168,6 +170,10 @@ def weigh(
         partial(_sheet, measured.balance),
         "measure.json",
     )
+
+
+def _estimate(found: "Estimate") -> dict[str, float]:
+    return {"value": found.value, "error": found.error}
 
 
 def _known(value: float) -> float | None:
@@ -203,8 +209,14 @@ def _sheet(balance: str, answer: dict[str, Any]) -> "Sheet":
     parts.append(balance)
     if answer["faces_weight"] is not None:
         total = answer["faces_weight"]
+        faces = tuple(
+            (", ".join(row["active"]), told(one["value"]), f"{one['error']:.1g}")
+            for row in answer["faces"]
+            if (one := row["weight"]) is not None
+        )
+        if faces:
+            parts.append(Table(("face", "weight", "error"), faces, (1, 2)))
         parts.append(
-            f"weight of all faces, without stickiness: {told(total['value'])} "
-            f"+- {total['error']:.1g}"
+            f"Without stickiness all faces weigh {told(total['value'])} +- {total['error']:.1g}."
         )
     return Sheet("", (*parts, *(f"note: {note}" for note in answer["notes"])))

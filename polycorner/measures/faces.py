@@ -11,7 +11,6 @@ from polycorner.kinds import checked
 from polycorner.measures.estimates import Estimate, ratio_of_means
 from polycorner.measures.sampling import STEPS, SampleOptions, StrataSample, sample
 from polycorner.measures.strata import StrataMeasures, skeleton_quotient
-from polycorner.polyhedra.symmetry import renamed
 from polycorner.printing import Printed, Sheet, listed, names, number
 from polycorner.progress import Progress, silent
 from polycorner.values import Checked
@@ -28,12 +27,16 @@ class FaceWeights(Checked, Printed):
     total : Estimate
         All of them together.
     by_contacts : mapping from tuple of str to Estimate
-        Faces with the same contacts, up to the finite group; empty where its elements are not
-        listed, as those of spheres that are alike.
+        Faces with the same contacts, up to the finite group; empty where neither its elements nor
+        :attr:`Symmetry.canonical <polycorner.Symmetry>` are given.
+    by_face : tuple of Estimate or None
+        Of every face of the skeleton; None where others have the same contacts, and where it was
+        not met.
     """
 
     total: Estimate
     by_contacts: Mapping[tuple[str, ...], Estimate]
+    by_face: tuple[Estimate | None, ...] = ()
 
     def __repr__(self) -> str:
         """Return the sum."""
@@ -121,9 +124,16 @@ def face_weights(
         return Estimate(e.value * balanced * known, e.error * balanced * known, e.effective)
 
     faces = [k for k, some in enumerate(found.strata) if len(some) < count]
-    symmetry = skeleton_quotient(measures.skeleton).symmetry
+    told = skeleton_quotient(measures.skeleton).symmetry.representative
     groups: dict[tuple[str, ...], list[int]] = {}
-    for k in faces if symmetry.relabel is None else []:
-        images = (renamed(frozenset(found.strata[k]), g.names) for g in symmetry.group)
-        groups.setdefault(min(tuple(sorted(image)) for image in images), []).append(k)
-    return FaceWeights(weight(faces), {some: weight(strata) for some, strata in groups.items()})
+    for k in faces:
+        contacts = told(found.strata[k])
+        if contacts is not None:
+            groups.setdefault(contacts, []).append(k)
+    by_contacts = {some: weight(strata) for some, strata in groups.items()}
+    kinds = [told(face.active) for face in measures.skeleton.faces]
+    by_face = [
+        by_contacts.get(kind) if kind is not None and kinds.count(kind) == 1 else None
+        for kind in kinds
+    ]
+    return FaceWeights(weight(faces), by_contacts, tuple(by_face))

@@ -447,7 +447,8 @@ def _joined(
         for kind in kinds.tolist()
     ]
     strata = list(dict.fromkeys([*before.strata, *found]))
-    places = np.array([strata.index(some) for some in found])[at.reshape(codes.shape[:2])]
+    where = {some: i for i, some in enumerate(strata)}
+    places = np.array([where[some] for some in found])[at.reshape(codes.shape[:2])]
     return StrataSample(
         before.sampler,
         np.concatenate([before.points, *points], axis=1),

@@ -117,6 +117,7 @@ class SphereCluster(Checked, Described):
             invariants=self.distances,
             key=self._sorted_distances,
             relabel=self._relabellings,
+            canonical=self._canonical,
         )
 
     def distances(self, q: ArrayLike) -> Array:
@@ -191,6 +192,40 @@ class SphereCluster(Checked, Described):
             names = (f"{i + 1}-{j + 1}" for i, j in targets)
             found.append(dict(zip(labels, names, strict=True)))
         return found
+
+    def _canonical(self, contacts: frozenset[str]) -> frozenset[str]:
+        """Return the contacts for a numbering of the spheres that does not depend on theirs."""
+        touching = np.zeros((self.count, self.count), dtype=np.int64)
+        for name in contacts:
+            i, j = (int(k) - 1 for k in name.split("-"))
+            touching[i, j] = touching[j, i] = 1
+        first, second = _least_pairs(touching, np.zeros(self.count, dtype=np.int64))
+        return frozenset(f"{i + 1}-{j + 1}" for i, j in zip(first, second, strict=True))
+
+
+def _least_pairs(
+    touching: NDArray[np.int64], colours: NDArray[np.int64]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the least pairs that numberings by colours make of those of a graph.
+
+    Vertices are told apart by the colours of their neighbours, and where that ends by each of a
+    class in turn.
+    """
+    n, classes = len(touching), 0
+    while True:
+        kinds = np.sort(np.where(touching, colours + 1, 0), axis=1)
+        keys = np.column_stack([colours, kinds])
+        colours = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+        if colours.max() + 1 == classes:
+            break
+        classes = int(colours.max()) + 1
+    if classes == n:
+        order = np.argsort(colours)
+        first, second = np.nonzero(np.triu(touching[np.ix_(order, order)]))
+        return tuple(first.tolist()), tuple(second.tolist())
+    sizes = np.bincount(colours)
+    members = np.flatnonzero(colours == np.flatnonzero(sizes > 1)[0])
+    return min(_least_pairs(touching, 2 * colours - (np.arange(n) == chosen)) for chosen in members)
 
 
 def _hollow(centres: list[Array], taken: set[tuple[int, ...]]) -> Array:

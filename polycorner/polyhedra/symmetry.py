@@ -62,6 +62,9 @@ class Symmetry(Checked):
     relabel : callable, optional
         ``(p, q, tolerance) -> relabellings`` that carry ``p`` to the orbit of ``q``, for groups
         that are too large to list; replaces ``elements``.
+    canonical : callable, optional
+        ``names -> names``: from a set of functions, the one of its images under the relabellings of
+        ``relabel`` that stands for all of them.
     fields : sequence of vector fields, optional
         The continuous symmetries as formulas, which :func:`~polycorner.prove` checks by exact
         algebra; see :func:`vector_field`.  They span the orbits where ``tangents`` is not given.
@@ -73,6 +76,7 @@ class Symmetry(Checked):
     key: Callable[[Array], Array] | None = None
     relabel: Callable[[Array, Array, float], Sequence[Relabelling]] | None = None
     fields: Sequence[Any] = ()
+    canonical: Callable[[frozenset[str]], frozenset[str]] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -95,6 +99,17 @@ class Symmetry(Checked):
     def group(self) -> list[Element]:
         """The finite group with the identity first."""
         return [Element(_same, {}), *self.elements]
+
+    @checked
+    def representative(self, names: Iterable[str]) -> tuple[str, ...] | None:
+        """Return the image of a set of functions that stands for all of them, sorted.
+
+        None where relabellings are not listed and :attr:`canonical` is not given.
+        """
+        given = frozenset(names)
+        if self.relabel is None:
+            return min(tuple(sorted(renamed(given, g.names))) for g in self.group)
+        return None if self.canonical is None else tuple(sorted(self.canonical(given)))
 
     @checked
     def directions(self, manifold: Manifold, q: Array) -> Array:

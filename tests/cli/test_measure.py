@@ -65,6 +65,8 @@ def test_a_region_in_a_file_weighed_with_its_faces(capsys, tmp_path):
     area = np.trapezoid(4 * s**2 * np.exp(-(s**2)), s)
     total = found["faces_weight"]
     assert abs(total["value"] - area) < 4 * total["error"] < 0.1
-    code, printed, _ = commands.run(capsys, "measure", str(path))
+    assert [face["weight"] for face in found["faces"]] == [total]
+    code, printed, _ = commands.run(capsys, "measure", str(path), "--faces", "2000")
     assert code == 0
+    assert "Without stickiness all faces weigh" in printed
     assert "In the sticky limit corners with the most contacts have all the weight." in printed

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from polycorner import skeleton
-from polycorner.measures import Weighting, measure, rates
+from polycorner.measures import SampleOptions, Weighting, face_weights, measure, rates
 from polycorner.models import SphereCluster
 
 TOUCH = 1e-7
@@ -194,3 +194,58 @@ def test_hinges_followed_from_every_contact(n, dimension):
     matrix = rates(weighed, diffusion=diffusion, edges=False).matrix
     np.fill_diagonal(matrix := matrix.copy(), 0.0)
     assert matrix == pytest.approx(expected, rel=4e-4, abs=1e-12)
+
+
+def rolled(angles):
+    """A tetrahedron, a sphere that rolls on its pair 1-2, one on 3-4; and what the angles move."""
+    root = math.sqrt(0.5)
+    core = np.array([[1.0, 0, -root], [-1, 0, -root], [0, 1, root], [0, -1, root]]) / 2
+    places, moved = list(core), []
+    for axis, height, angle in ((0, -root / 2, angles[0]), (1, root / 2, angles[1])):
+        side, away = np.eye(3)[1 - axis], np.array([0, 0, np.sign(height)])
+        radius = math.sqrt(0.75)
+        places.append(
+            np.array([0, 0, height]) + radius * (math.cos(angle) * away + math.sin(angle) * side)
+        )
+        moved.append(radius * (math.cos(angle) * side - math.sin(angle) * away))
+    x = np.array(places)
+    tangents = np.zeros((2, 6, 3))
+    tangents[0, 4], tangents[1, 5] = moved
+    return x, tangents.reshape(2, -1)
+
+
+def face_by_quadrature(nodes):
+    """Over both angles, between their limits: a sphere rolls from one face to the next.
+
+    At either end it lies on a face, a dihedral angle from the face of the core; the two
+    spheres never meet.  The contacts have eight symmetries.
+    """
+    most = math.pi - 1.5 * math.acos(1 / 3)
+    s, w = np.polynomial.legendre.leggauss(nodes)
+    total = 0.0
+    for a, one in zip(most * s, most * w, strict=True):
+        for b, two in zip(most * s, most * w, strict=True):
+            x, tangents = rolled((a, b))
+            held = np.flatnonzero(abs(gaps(x)) < TOUCH)
+            assert len(held) == 10
+            assert gaps(x).min() > -TOUCH
+            T = motions(x)
+            across = tangents - (tangents @ np.linalg.pinv(T)) @ T
+            total += one * two * density(x, held) * math.sqrt(np.linalg.det(across @ across.T))
+    return total / 8
+
+
+def test_a_floppy_cluster_of_two_motions():
+    """Six spheres: a tetrahedron with two that roll on opposite pairs, and all faces together."""
+    model, atlas = clusters(6)
+    exact = face_by_quadrature(12)
+    assert exact == pytest.approx(face_by_quadrature(16), rel=1e-8)
+    contacts = {"1-2", "1-3", "1-4", "2-3", "2-4", "3-4", "1-5", "2-5", "3-6", "4-6"}
+    kinds = [model.symmetry.representative(face.active) for face in atlas.faces]
+    at = kinds.index(model.symmetry.representative(contacts))
+    options = SampleOptions(step=0.15, sideways=0.05, reach=0.25, every=5, gain=0.3, lose=0.3)
+    found = face_weights(measure(atlas), points=10_000, rng=1, options=options)
+    one = found.by_face[at]
+    assert abs(one.value - exact) < 4 * one.error < 0.4 * exact
+    assert sum(e.value for e in found.by_face) == pytest.approx(found.total.value)
+    assert len(found.by_contacts) == len(atlas.faces)

@@ -34,6 +34,7 @@ few = settings(max_examples=settings.default.max_examples // 4)
 # Rigid clusters [HC] table I; one- and two-dimensional modes [HGB] table I.
 PUBLISHED = {5: (1, 2, 4), 6: (2, 5, 13), 7: (5, 16, 51), 8: (13, 75, 281)}
 NINE, TEN = 52, 263
+FIVE = SphereCluster(5)
 
 
 @lru_cache
@@ -369,3 +370,25 @@ class TestModel:
             (TypeError, ValueError), match=r"^count: expected a whole number >= 2; "
         ):
             SphereCluster(count)
+
+
+@given(st.sets(st.sampled_from(sorted(FIVE.polyhedron.names))), st.permutations(range(1, 6)))
+def test_one_set_of_contacts_stands_for_all_numberings(contacts, image):
+    """Of 34 graphs of five vertices each has one; it is one of its numberings."""
+    turned = {"-".join(map(str, sorted(image[int(k) - 1] for k in c.split("-")))) for c in contacts}
+    stands = FIVE.symmetry.representative(contacts)
+    assert stands == FIVE.symmetry.representative(turned)
+    images = (
+        {frozenset(p[int(k) - 1] for k in c.split("-")) for c in contacts}
+        for p in itertools.permutations(range(1, 6))
+    )
+    assert {frozenset(map(int, c.split("-"))) for c in stands} in images
+
+
+def test_there_are_34_sets_of_contacts_of_five_spheres():
+    """[OEIS A000088]: graphs of five unlabelled vertices."""
+    names = FIVE.polyhedron.names
+    sets = (
+        itertools.compress(names, bits) for bits in itertools.product((0, 1), repeat=len(names))
+    )
+    assert len({FIVE.symmetry.representative(some) for some in sets}) == 34

@@ -326,6 +326,7 @@ CALLS = {
     "Symmetry.displacement": lambda: ON | BETWEEN,
     "Symmetry.possible": lambda: ON | {"p": SQUARE, "points": SQUARE[None], "tolerance": 1e-6},
     "Symmetry.relabellings": lambda: ON | BETWEEN | {"tolerance": 1e-6},
+    "Symmetry.representative": lambda: {"names": ["left"]},
     "Symmetry.separation": lambda: ON | BETWEEN,
     "Symmetry.separations": lambda: ON | {"p": SQUARE, "points": SQUARE[None]},
     "Solver.crowd": lambda: {"crowd_sweeps": 5},
