@@ -184,11 +184,12 @@ GROUPS = (
     ),
     Group(
         "Save and load",
-        "Problems, certificates, skeletons, landscapes, diagrams, graphs, trajectories in files.",
+        "Problems, certificates, skeletons, landscapes, diagrams, graphs, trajectories, samples.",
         {
             "files": "ProblemFile save_problem load_problem save_certificate load_certificate "
             "save_skeleton load_skeleton save_trajectory load_trajectory skeleton_graph "
-            "save_graph load_graph save_landscape load_landscape save_diagram load_diagram",
+            "save_graph load_graph save_landscape load_landscape save_diagram load_diagram "
+            "save_sample load_sample",
         },
     ),
     Group(

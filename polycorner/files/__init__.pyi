@@ -5,6 +5,7 @@ from .landscapes import load_landscape, save_landscape
 from .meshes import MeshOptions, Solid, read_mesh
 from .particles import Particles, molecule, read_particles
 from .problems import ProblemFile, load_problem, save_problem
+from .samples import load_sample, save_sample
 from .skeletons import load_skeleton, save_skeleton
 from .trajectories import load_trajectory, save_trajectory
 from .urdf import read_urdf
@@ -19,6 +20,7 @@ __all__ = [
     "load_graph",
     "load_landscape",
     "load_problem",
+    "load_sample",
     "load_skeleton",
     "load_trajectory",
     "molecule",
@@ -30,6 +32,7 @@ __all__ = [
     "save_graph",
     "save_landscape",
     "save_problem",
+    "save_sample",
     "save_skeleton",
     "save_trajectory",
     "skeleton_graph",

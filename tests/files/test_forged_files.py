@@ -27,7 +27,16 @@ from proof_files import verdict
 from polycorner import Manifold, Polyhedron, files, minimise, simulate, skeleton
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.dynamics import files as run_files
-from polycorner.files import branches, certificates, graphs, landscapes, skeletons, trajectories
+from polycorner.files import (
+    branches,
+    certificates,
+    graphs,
+    landscapes,
+    samples,
+    skeletons,
+    trajectories,
+)
+from polycorner.measures import Weighting, sample
 from polycorner.models import textbook
 from polycorner.motion import Checkpoint, checkpoints
 from polycorner.proofs import stationary_points
@@ -74,6 +83,12 @@ def diagram(folder):
 
     path = files.save_diagram(leaning_well(), folder / "diagram")
     return Kept(path, forge_json(branches.KIND), read)
+
+
+def points(folder):
+    found = sample(BOWL, [[0.0, 1.0]], 20, weighting=Weighting(energy=X), rng=1)
+    path = files.save_sample(found, folder / "sample")
+    return Kept(path, forge_arrays(samples.KIND), lambda path: str(files.load_sample(path).more(5)))
 
 
 def unfinished(folder):
@@ -143,6 +158,7 @@ KINDS = [
     atlas,
     landscape,
     diagram,
+    points,
     unfinished,
     graph,
     trajectory,

@@ -495,6 +495,9 @@ CALLS = {
         "path": files.save_landscape(double_well(), of.new("landscape.json"))
     },
     "files.load_problem": lambda: {"path": of.problem_file()},
+    "files.load_sample": lambda: {
+        "path": files.save_sample(of.strata_sample(), of.new("sample.npz"))
+    },
     "files.load_skeleton": lambda: {"path": of.kept("skeleton")},
     "files.read_urdf": lambda: {"path": of.urdf_file()},
     "Particles.points": lambda: {"arrangement": bodies.Arrangement({"a": bodies.disc(1.0)})},
@@ -507,6 +510,7 @@ CALLS = {
     "files.save_diagram": lambda: {"diagram": of.diagram(), "path": of.new("d.json")},
     "files.save_graph": lambda: {"skeleton": of.skeleton(), "path": of.new("g.graphml")},
     "files.save_landscape": lambda: {"landscape": double_well(), "path": of.new("l.json")},
+    "files.save_sample": lambda: {"found": of.strata_sample(), "path": of.new("s.npz")},
     "files.save_problem": lambda: {
         "path": of.new("p.toml"),
         "polyhedron": of.square(),
