@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from polycorner import AnyOf, Manifold, Polyhedron, skeleton
 from polycorner.dumbbells import DumbbellPair
 from polycorner.measures import SampleOptions, Weighting, measure, sample
-from polycorner.measures.estimates import ratio_of_means, series_mean
+from polycorner.measures.estimates import series_mean
 from polycorner.models import SphereCluster
 
 M = Manifold.euclidean("x y")
@@ -144,22 +144,6 @@ def test_edges_of_clusters_weigh_what_quadrature_says():
         options=SampleOptions(step=0.25, sideways=0.05, reach=0.3, every=10),
     )  # fmt: skip
     assert agree(chains.ratio(6, 7), found.edges.sum() / found.corners.sum())
-
-
-def test_pressure_of_hard_rods_on_a_line():
-    """``d log Z / dL = N / (L - N s)``: what contacts with the wall weigh over what is free."""
-    count, length, size = 3, 2.0, 0.3
-    line = Manifold.euclidean([f"x{k}" for k in range(count)])
-    places = [size / 2, *line.symbols, length - size / 2]
-    gaps = {"left": places[1] - places[0], "right": places[-1] - places[-2]}
-    gaps |= {f"{k}": places[k + 1] - places[k] - size for k in range(1, count)}
-    found = sample(
-        Polyhedron(line, gaps), [[0.4, 1.0, 1.6]] * 4, 20_000, contacts=(0, 1), rng=9,
-        options=SampleOptions(step=0.25, sideways=0.1, reach=0.3),
-    )  # fmt: skip
-    wall = found.strata.index(("right",))
-    pressure = ratio_of_means(found.positions == wall, found.contacts == 0)
-    assert agree(pressure, count / (length - count * size))
 
 
 def test_effective_sizes_of_an_autoregressive_series():

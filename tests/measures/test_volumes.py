@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from polycorner import AnyOf, Manifold, Polyhedron
+from polycorner import Manifold, Polyhedron
 from polycorner.measures import Weighting, volume
 
 M = Manifold.euclidean("x y z")
@@ -51,21 +51,6 @@ def test_two_hard_discs_on_a_torus():
     inside = np.clip(0.09 - np.sin(np.pi * u) ** 2, 0, None)
     taken = np.trapezoid(2 * np.arcsin(np.sqrt(inside)) / np.pi, u)
     assert found.volume.value == pytest.approx(1 - taken, abs=5 * found.volume.error + 1e-5)
-
-
-def test_hard_squares_in_a_box():
-    """Two squares of side ``s`` in a unit box: ``a^4`` less the overlaps, ``a = 1 - s``."""
-    S = Manifold.euclidean("x1 y1 x2 y2")
-    x1, y1, x2, y2 = S.symbols
-    side = 0.3
-    apart = AnyOf(x2 - x1 - side, x1 - x2 - side, y2 - y1 - side, y1 - y2 - side)
-    (found,) = volume(Polyhedron(S, apart), [(0, 1 - side)] * 4, points=2**13, rng=6)
-    assert close(found.volume, squares(1.0, side))
-
-
-def squares(length, side):
-    free = length - side
-    return free**4 - (free**2 - (free - side) ** 2) ** 2
 
 
 def test_refusals():
