@@ -1,7 +1,9 @@
 """Sampling a parabola with a lid, ten million points; clusters, their weights and floppy modes.
 
 110 s are reported for the ten million points by the published sampler ([HC20]).  ``--points`` is
-their number, ``--clusters`` lists numbers of spheres, ``--floppy`` points of each of four chains.
+their number, ``--clusters`` lists numbers of spheres, ``--floppy`` points of each of four chains,
+``--wells`` steps of a plain chain with square wells of several widths, which floppy clusters of six
+spheres are compared with (none by default; 100000000 take a minute and a half for each width).
 """
 
 import argparse
@@ -12,7 +14,7 @@ import numpy as np
 from side_by_side import print_table, write
 
 from polycorner import Manifold, Polyhedron, skeleton
-from polycorner.measures import SampleOptions, Weighting, measure, sample
+from polycorner.measures import SampleOptions, Weighting, face_weights, measure, sample
 from polycorner.models import SphereCluster
 
 ROOT = math.sqrt(2)
@@ -56,7 +58,7 @@ def cluster(n: int, *, edges: bool) -> dict[str, float]:
 
 
 def floppy(points: int) -> dict[str, float]:
-    """Weigh strata of six spheres with eleven, ten and nine contacts, by chains."""
+    """Weigh strata of six spheres with eleven and ten contacts, by chains."""
     model = SphereCluster(6)
     options = SampleOptions(step=0.15, sideways=0.05, reach=0.25, every=5, gain=0.3, lose=0.3)
     begin = process_time()
@@ -69,15 +71,34 @@ def floppy(points: int) -> dict[str, float]:
     return row | {"Z1/Z0": one.value, "error": one.error, "Z2/Z1": two.value, "error 2": two.error}
 
 
+def faces(points: int) -> dict[str, float]:
+    """Weigh the faces of six spheres beside their edges."""
+    model = SphereCluster(6)
+    measures = measure(skeleton(model.polyhedron, model.starts(), symmetry=model.symmetry))
+    options = SampleOptions(step=0.15, sideways=0.05, reach=0.25, every=5, gain=0.3, lose=0.3)
+    begin = process_time()
+    found = face_weights(measures, points=points, rng=1, options=options).total
+    row = {"points": 4 * points, "cpu_s": process_time() - begin}
+    z = float(measures.corners.sum())
+    row |= {"Z1/Z0": float(measures.edges.sum()) / z, "Z2/Z0": found.value / z}
+    return row | {"error": found.error / z}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--points", type=int, default=10_000_000)
     parser.add_argument("--clusters", type=int, nargs="*", default=[6, 7, 8])
     parser.add_argument("--floppy", type=int, default=50_000)
+    parser.add_argument("--wells", type=int, default=0)
     given = parser.parse_args()
     results = {"parabola": [parabola(given.points)]}
     results["clusters"] = [cluster(n, edges=n < 9) for n in given.clusters]
     results["floppy"] = [floppy(given.floppy)] if given.floppy else []
+    results["faces"] = [faces(given.floppy)] if given.floppy else []
+    if given.wells:
+        from square_wells import ratios
+
+        results["square wells"] = [ratios(width, given.wells) for width in (0.08, 0.04)]
     for title, rows in results.items():
         if rows:
             print_table(title, list(rows[0]), [[f"{v:.6g}" for v in row.values()] for row in rows])

@@ -155,7 +155,7 @@ def weigh(
         "stickiness": None if math.isinf(stickiness) else stickiness,
     }
     answer["partition"] = {str(d): z for d, z in measured.partition.items()}
-    answer["notes"] += measured.notes
+    notes = measured.notes
     answer["faces_weight"] = None
     if weighed is not None:
         answer["faces_weight"] = _estimate(weighed.total)
@@ -163,7 +163,9 @@ def weigh(
             row["weight"] = None if one is None else _estimate(one)
     answer["rates"] = None
     if not math.isinf(stickiness) and not np.isnan(measured.corners).any():
-        answer["rates"] = rates(measured, diffusion=diffusion).matrix.tolist()
+        between = rates(measured, diffusion=diffusion)
+        answer["rates"], notes = between.matrix.tolist(), between.notes
+    answer["notes"] += notes
     search.finish(
         answer,
         lambda folder: draw(folder, answer["corners"]),

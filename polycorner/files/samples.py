@@ -121,7 +121,7 @@ def _read(content: Entries, about: Entries, polyhedron: "Polyhedron", energy: An
     """Return the sample after a check of each number."""
     names, n, m = polyhedron.names, polyhedron.manifold.size, len(polyhedron.functions)
     if polyhedron.is_union:
-        checks.refuse("problem", "inequalities that hold together, without unions", polyhedron)
+        checks.refuse("problem", "inequalities that hold together", polyhedron)
     active = forms.made(forms.many(forms.word(*names)), tuple)
     read: Entries = forms.entries(
         {

@@ -13,7 +13,9 @@ the sum over the edges at ``a`` and ``h_a`` the function that falls along an edg
 to 0, ``h_a' = -1 / (R w)``.  So corners are the states of a Markov chain with the rates
 ``D0 / (R_e M_a)``: mean passage times of the chain are those of the diffusion, and a committor, for
 which the right-hand side is zero, too.  Where stickiness grows, ``M_a`` tends to ``Z_a``, and the
-rates are those of transition-state theory to leading order.
+rates are those of transition-state theory to leading order.  Faces and larger strata are left out:
+rates that lead over them are smaller by one power of the stickiness than those along edges, and
+the time that is spent there is not counted.
 
 Symmetry: an edge of the quotient stands for ``|G| / |S_e|`` edges, a corner for ``|G| / |S_a|``
 corners; ``R_e`` counts once for each edge, weights for each corner.  Edges that lead from a
@@ -33,6 +35,11 @@ from polycorner.printing import Printed, Sheet, listed, number
 from polycorner.skeletons.elements import corner_name
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, cached_property
+
+LEFT_OUT = (
+    "rates are along edges alone: faces and larger strata, which large stickiness makes rare, \
+are left out"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,4 +186,4 @@ def rates(
         if a is not None and b is not None and a != b:
             conductances[a, b] += flux
             conductances[b, a] += flux
-    return TransitionRates(conductances, weights, measures.notes)
+    return TransitionRates(conductances, weights, (*measures.notes, LEFT_OUT))

@@ -371,7 +371,8 @@ def sample(
     """
     checks.whole("points", points, least=1, most=checks.MOST)
     if polyhedron.is_union:
-        checks.refuse("polyhedron", "inequalities that hold together, without unions", polyhedron)
+        expected = "inequalities that hold together, as each part of a union does"
+        checks.refuse("polyhedron", expected, polyhedron)
     if weighting.is_limit:
         checks.refuse("weighting", "a finite stickiness", weighting)
     checks.names("keep", keep, polyhedron.names)

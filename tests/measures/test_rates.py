@@ -115,6 +115,10 @@ def test_six_discs_have_three_ground_states_joined_by_their_rates():
     assert (k.matrix[~np.eye(3, dtype=bool)] > 0).all()
 
 
+def test_it_says_that_faces_are_left_out():
+    assert "faces" in str(box_rates()[0])
+
+
 def test_refusals():
     found = measure(skeleton(BOX, [[0.5, 0.5]]))
     with pytest.raises(ValueError, match="finite stickiness"):

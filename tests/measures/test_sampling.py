@@ -160,7 +160,7 @@ def test_effective_sizes_of_an_autoregressive_series():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"polyhedron": Polyhedron(M, AnyOf(x, y))}, "without unions"),
+        ({"polyhedron": Polyhedron(M, AnyOf(x, y))}, "as each part of a union does"),
         ({"weighting": Weighting(stickiness=math.inf)}, "finite stickiness"),
         ({"starts": [[0.0, 3.0]]}, "points of the polyhedron"),
         ({"contacts": (1, 2)}, "1 to 2 contacts vanish"),
