@@ -195,37 +195,38 @@ class SphereCluster(Checked, Described):
 
     def _canonical(self, contacts: frozenset[str]) -> frozenset[str]:
         """Return the contacts for a numbering of the spheres that does not depend on theirs."""
-        touching = np.zeros((self.count, self.count), dtype=np.int64)
+        beside: list[list[int]] = [[] for _ in range(self.count)]
         for name in contacts:
             i, j = (int(k) - 1 for k in name.split("-"))
-            touching[i, j] = touching[j, i] = 1
-        first, second = _least_pairs(touching, np.zeros(self.count, dtype=np.int64))
-        return frozenset(f"{i + 1}-{j + 1}" for i, j in zip(first, second, strict=True))
+            beside[i].append(j)
+            beside[j].append(i)
+        return frozenset(f"{i + 1}-{j + 1}" for i, j in _least_pairs(beside, [0] * self.count))
 
 
-def _least_pairs(
-    touching: NDArray[np.int64], colours: NDArray[np.int64]
-) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _least_pairs(beside: list[list[int]], colours: list[int]) -> list[tuple[int, int]]:
     """Return the least pairs that numberings by colours make of those of a graph.
 
     Vertices are told apart by the colours of their neighbours, and where that ends by each of a
     class in turn.
     """
-    n, classes = len(touching), 0
+    n, classes = len(beside), 0
     while True:
-        kinds = np.sort(np.where(touching, colours + 1, 0), axis=1)
-        keys = np.column_stack([colours, kinds])
-        colours = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
-        if colours.max() + 1 == classes:
+        keys = [(colours[i], *sorted(colours[j] for j in beside[i])) for i in range(n)]
+        ranks = {key: k for k, key in enumerate(sorted(set(keys)))}
+        colours = [ranks[key] for key in keys]
+        if len(ranks) == classes:
             break
-        classes = int(colours.max()) + 1
+        classes = len(ranks)
     if classes == n:
-        order = np.argsort(colours)
-        first, second = np.nonzero(np.triu(touching[np.ix_(order, order)]))
-        return tuple(first.tolist()), tuple(second.tolist())
-    sizes = np.bincount(colours)
-    members = np.flatnonzero(colours == np.flatnonzero(sizes > 1)[0])
-    return min(_least_pairs(touching, 2 * colours - (np.arange(n) == chosen)) for chosen in members)
+        return sorted(
+            (a, b) for i, a in enumerate(colours) for j in beside[i] if (b := colours[j]) > a
+        )
+    several = min(colour for colour in colours if colours.count(colour) > 1)
+    members = [i for i, colour in enumerate(colours) if colour == several]
+    return min(
+        _least_pairs(beside, [2 * colour - (i == one) for i, colour in enumerate(colours)])
+        for one in members
+    )
 
 
 def _hollow(centres: list[Array], taken: set[tuple[int, ...]]) -> Array:
