@@ -297,6 +297,7 @@ class Arrangement(Checked, Printed):
         friction: Coefficients = 0.0,
         rolling: Coefficients = 0.0,
         restitution: Restitution = 0.0,
+        impact: str = "poisson",
         exits: Mapping[str, float] | None = None,
         count: int | Mapping[str, int] = 1,
         joints: Mapping[str, Any] | None = None,
@@ -332,6 +333,8 @@ class Arrangement(Checked, Printed):
             (r + s)`` for two rounded parts; none at the sides of polygons and polyhedra.
         restitution : float or mapping from str or (str, str) to float, optional
             As in :class:`~polycorner.System`; names as for ``friction``.
+        impact : str, optional
+            Law of impact, as in :class:`~polycorner.System`.
         exits : mapping from str to float, optional
             As in :class:`~polycorner.System`.
         count : int, or mapping from str to int, optional
@@ -384,7 +387,8 @@ class Arrangement(Checked, Printed):
             own = {name for one in alone.values() for name in one.joints}
             held = {name: joint for name, joint in self.joints.items() if name not in own}
             held |= self._further(joints)
-            return assembly(alone, count, given, further, held, gravity=gravity, density=density)
+            rest = {"gravity": gravity, "density": density, "impact": impact}
+            return assembly(alone, count, given, further, held, **rest)
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1, or numbers by name, for several bodies", count)
         if len(self.placements) > 1:
@@ -449,6 +453,7 @@ class Arrangement(Checked, Printed):
                 tuple((one, (a.body, b.body)) for one, (a, b) in hulls),
             ),
             ties=bouncing(ties, known.restitution),
+            impact=impact,
         )
 
     def _further(self, joints: Any) -> dict[str, AnyJoint]:

@@ -390,6 +390,7 @@ class Robot(Checked):
         torques: "Mapping[str, sympy.Expr] | None" = None,
         friction: float | Mapping[str, float] = 0.0,
         restitution: float | Mapping[str, float] = 0.0,
+        impact: str = "poisson",
     ) -> System:
         """Return the mechanical system of links and bodies.
 
@@ -408,7 +409,7 @@ class Robot(Checked):
             (:func:`~polycorner.motion.time_symbol`).  Beyond the effort of the joint it is cut off.
         friction : float or mapping from str to float, optional
             Coulomb's coefficient at walls, for all or by wall; half-spaces only.
-        restitution : optional
+        restitution, impact : optional
             As in :class:`~polycorner.System`.
 
         Raises
@@ -447,7 +448,8 @@ class Robot(Checked):
         checks.names("torques", given, self._tree.free)
         driven = link_laws.forces(self.joints, self._rates, given)
         laws = (*link_laws.joint_friction(self.joints, self._rates), *self._wall_friction(friction))
-        return System(polyhedron, kinetic, potential, driven, laws, restitution=restitution)
+        bounces = {"restitution": restitution, "impact": impact}
+        return System(polyhedron, kinetic, potential, driven, laws, **bounces)
 
     def _wall_friction(self, given: float | Mapping[str, float]) -> Iterator[Friction]:
         """Yield the friction of links and bodies at half-spaces."""

@@ -31,6 +31,7 @@ from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.motion.assembly import Assembly
+from polycorner.motion.bodies import IMPACT_LAWS
 from polycorner.motion.contacts import ContactFamily
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.system import System
@@ -288,6 +289,7 @@ def _body(system: System) -> dict[str, Any]:
         "scales": list(manifold.scales),
         "contacts": list(system.contacts),
         "restitution": system.restitutions.tolist(),
+        **({} if system.impact == IMPACT_LAWS[0] else {"impact": system.impact}),
         "friction": friction,
         "kinetic": text(system.kinetic),
         "potential": text(system.potential),

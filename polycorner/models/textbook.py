@@ -32,7 +32,7 @@ END = 1000.0  # where planes end, in m
 Point = tuple[float, float]
 
 
-def bouncing_ball(restitution: float = 1.0) -> System:
+def bouncing_ball(restitution: float = 1.0, impact: str = "poisson") -> System:
     """Return a point at the height ``y >= 0`` that falls and bounces off a ``floor``.
 
     Dropped from ``h`` it lands after ``t = sqrt(2 h / g)``.  With ``e = 1`` it is back after
@@ -41,7 +41,8 @@ def bouncing_ball(restitution: float = 1.0) -> System:
     """
     M = Manifold.euclidean("y", unit="m")
     (y,), (v,) = M.symbols, velocities(M)
-    return System(Polyhedron(M, {"floor": y}), v**2 / 2, GRAVITY * y, restitution=restitution)
+    bounces = {"restitution": restitution, "impact": impact}
+    return System(Polyhedron(M, {"floor": y}), v**2 / 2, GRAVITY * y, **bounces)
 
 
 def sliding_block(
@@ -95,7 +96,7 @@ def ball_on_plane(
     )
 
 
-def thrown_ball(friction: ConvexSet, restitution: float = 0.0) -> System:
+def thrown_ball(friction: ConvexSet, restitution: float = 0.0, impact: str = "poisson") -> System:
     """Return a solid ball that spins in the plane and bounces off a rough ``floor``; ``x y a``.
 
     An impact at the speed ``w`` with the slip ``s = x' - r a'`` changes ``x'`` by ``-2/7 s`` if
@@ -110,10 +111,11 @@ def thrown_ball(friction: ConvexSet, restitution: float = 0.0) -> System:
         GRAVITY * y,
         friction=(rough,),
         restitution=restitution,
+        impact=impact,
     )
 
 
-def wall_pendulum(wall: float = 0.0, restitution: float = 1.0) -> System:
+def wall_pendulum(wall: float = 0.0, restitution: float = 1.0, impact: str = "poisson") -> System:
     """Return a pendulum at the angle ``theta >= wall`` from its lowest place; ``|wall| < pi / 2``.
 
     The wall is vertical and hit by the bob.  Amplitudes and periods follow from the energy, which
@@ -128,6 +130,7 @@ def wall_pendulum(wall: float = 0.0, restitution: float = 1.0) -> System:
         w**2 / 2,
         -GRAVITY * sympy.cos(theta),
         restitution=restitution,
+        impact=impact,
     )
 
 
@@ -157,20 +160,22 @@ def bead_in_ring() -> System:
     return System(D, (vx**2 + vy**2) / 2, sp.Integer(0))
 
 
-def row_of_balls(masses: Sequence[float] = (1.0, 1.0, 1.0), restitution: float = 1.0) -> System:
+def row_of_balls(
+    masses: Sequence[float] = (1.0, 1.0, 1.0), restitution: float = 1.0, impact: str = "poisson"
+) -> System:
     """Return balls in a row, on a line without forces: ``x_1 < x_2 < ...``.
 
-    Contacts that close together obey Newton's law together ([Moreau]): the first of three equal
-    balls hits two at rest that touch, and ``(1, 0, 0)`` becomes ``(-1, 2, 2) / 3``.  If they are
-    apart, however little, the impacts follow each other and ``(0, 0, 1)`` comes out.
+    Contacts that close together obey the law of impact together ([Moreau]): the first of three
+    equal balls hits two at rest that touch, and ``(1, 0, 0)`` becomes ``(-1, 2, 2) / 3``.  If they
+    are apart, however little, the impacts follow each other and ``(0, 0, 1)`` comes out.
     """
     M = Manifold.euclidean(" ".join(f"x{i + 1}" for i in range(len(masses))))
     gaps = {f"{a.name}{b.name}": b - a - 1 for a, b in pairwise(M.symbols)}
     kinetic = sum(m * v**2 for m, v in zip(masses, velocities(M), strict=True)) / 2
-    return System(Polyhedron(M, gaps), kinetic, restitution=restitution)
+    return System(Polyhedron(M, gaps), kinetic, restitution=restitution, impact=impact)
 
 
-def newtons_cradle(balls: int, restitution: float = 1.0) -> System:
+def newtons_cradle(balls: int, restitution: float = 1.0, impact: str = "poisson") -> System:
     """Return equal balls of diameter 1 in a row, any two of which may meet; ``x`` of each.
 
     Unlike :func:`row_of_balls` these are bodies of one system, with a family of contacts.  Balls
@@ -184,7 +189,8 @@ def newtons_cradle(balls: int, restitution: float = 1.0) -> System:
     (x1,), (x2,) = pair_coordinates(M)
     apart = ContactFamily({"balls": sympy.Abs(x2 - x1) - 1}, reach=1.0, restitution=restitution)
     ends = Polyhedron(M, {"left": END + x, "right": END - x})
-    return System(ends, v**2 / 2, sympy.Integer(0), count=balls, between=apart)
+    many = {"count": balls, "between": apart, "impact": impact}
+    return System(ends, v**2 / 2, sympy.Integer(0), **many)
 
 
 def dispersing_billiard(radius: float = 0.5) -> System:
@@ -270,6 +276,7 @@ def body_on_plane(
     friction: ConvexSet,
     *,
     restitution: float = 0.0,
+    impact: str = "poisson",
     angle: float = 0.0,
     belt: float = 0.0,
 ) -> System:
@@ -293,6 +300,7 @@ def body_on_plane(
         GRAVITY * (math.cos(angle) * y - math.sin(angle) * x),
         friction=tuple(rough),
         restitution=restitution,
+        impact=impact,
     )
 
 
@@ -302,6 +310,7 @@ def box_on_plane(
     friction: ConvexSet,
     *,
     restitution: float = 0.0,
+    impact: str = "poisson",
     angle: float = 0.0,
     belt: float = 0.0,
 ) -> System:
@@ -315,7 +324,7 @@ def box_on_plane(
     feet = [(-half_width, -half_height), (half_width, -half_height)]
     inertia = (half_width**2 + half_height**2) / 3
     options = {"restitution": restitution, "angle": angle, "belt": belt}
-    return body_on_plane(feet, inertia, friction, **options)
+    return body_on_plane(feet, inertia, friction, impact=impact, **options)
 
 
 def rimless_wheel(

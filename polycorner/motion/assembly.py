@@ -41,7 +41,7 @@ class Assembly(MechanicalSystem):
     ----------
     kinds : mapping from str to System
         One body of each kind, with its contacts with the surroundings.  The substrate, if it moves,
-        moves under all of them.
+        moves under all of them, and the law of impact is that of all.
     count : mapping from str to int
         How many of each there are.
     between : mapping from (str, str) to ContactFamily, optional
@@ -103,6 +103,8 @@ class Assembly(MechanicalSystem):
                 refuse("kinds", f"one body as {name!r}, counts and contacts apart", one.count)
             if one.rheonomic:
                 refuse("kinds", f"no equations with the time for {name!r}", [*one.rheonomic])
+            if one.impact != next(iter(kinds.values())).impact:
+                refuse("kinds", f"the same law of impact for {name!r} as for others", one.impact)
             if {*one.substrate.values()} != {*next(iter(kinds.values())).substrate.values()}:
                 refuse("kinds", f"the same substrate for {name!r} as for others", one.substrate)
             if self.ties and one.exits:
@@ -150,7 +152,7 @@ class Assembly(MechanicalSystem):
             refuse("kinds", "positions that repeat after the same lengths", sorted(lengths))
         first = next(iter(own.values()))
         counted = [(self.kinds[name].manifold, n) for name, n in self.count.items()]
-        every = SeveralKinds(own, between, first.period, first.substrate_speed)
+        every = SeveralKinds(own, between, first.period, first.substrate_speed, impact=first.impact)
         return replace(every, ties=compiled_ties(self.ties, counted, every.names))
 
     def _kind(self, name: str) -> IdenticalBodies:

@@ -21,6 +21,7 @@ from polycorner.values import Value, cached_property
 # Causes of dissipation.
 IMPACT = "impact"
 RUBBING = "rubbing"
+IMPACT_LAWS = ("poisson", "newton", "stronge", "newton unlimited")
 
 
 @dataclass(frozen=True)
@@ -176,11 +177,14 @@ class MovingBodies(Value):
         Speed of the substrate along the first of them, as a length per time.
     ties : Ties
         Ties of two bodies, or of one and the world.
+    impact : str
+        The law of impacts, one of ``IMPACT_LAWS``.
     """
 
     period: tuple[float, ...]
     substrate_speed: float
     ties: Ties
+    impact: str
 
     @property
     def kinds(self) -> "tuple[IdenticalBodies, ...]":
@@ -267,6 +271,13 @@ class MovingBodies(Value):
     def frictions(self) -> int:
         """Number of the friction contacts of all bodies with their surroundings."""
         return sum(kind.count * len(kind.body.friction) for kind in self.kinds)
+
+    @property
+    def bounces(self) -> bool:
+        """Whether a contact has a coefficient of restitution that is not zero."""
+        own = [kind.body.restitution.any() for kind in self.kinds]
+        pairs = [family.restitution for family in self.families.values()]
+        return any((*own, *pairs, *self.ties.restitution))
 
     @property
     def gap_unit(self) -> float:
@@ -469,6 +480,8 @@ class IdenticalBodies(MovingBodies):
         Of the bodies; of a dense system of those that it consists of.
     ties : Ties
         As of :class:`MovingBodies`; none by default.
+    impact : str
+        The same.
     """
 
     body: MovingBody
@@ -481,6 +494,7 @@ class IdenticalBodies(MovingBodies):
     exit_limit: float = 0.0
     names: tuple[str, ...] = ()
     ties: Ties = NO_TIES
+    impact: str = IMPACT_LAWS[0]
 
     @property
     def kinds(self) -> "tuple[IdenticalBodies, ...]":
@@ -521,6 +535,8 @@ class SeveralKinds(MovingBodies):
         As of :class:`IdenticalBodies`; those of the kinds are not used.
     ties : Ties
         The same.
+    impact : str
+        The same.
     """
 
     named: Mapping[str, IdenticalBodies]
@@ -528,6 +544,7 @@ class SeveralKinds(MovingBodies):
     period: tuple[float, ...] = (np.inf, np.inf)
     substrate_speed: float = 0.0
     ties: Ties = NO_TIES
+    impact: str = IMPACT_LAWS[0]
 
     @property
     def kinds(self) -> tuple[IdenticalBodies, ...]:

@@ -249,7 +249,7 @@ class ContactFamily(Checked):
     friction : sequence of PairFriction, optional
         The laws of friction at the gaps, each with a convex set of its own; default none.
     restitution : float, optional
-        Newton's coefficient ``0 <= e <= 1``; default 0, plastic.
+        Coefficient ``0 <= e <= 1``, for the law of impact of the system; default 0, plastic.
     definitions : mapping from str to sympy.Expr, optional
         Intermediate quantities that the gaps use by name, each also in later ones.
 

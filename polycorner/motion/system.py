@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.checks import names, real, reals, refuse, whole
+from polycorner.checks import choice, names, real, reals, refuse, whole
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.formulas.families import Family
 from polycorner.kinds import check_fields, checked
-from polycorner.motion.bodies import FrictionContact, IdenticalBodies, MovingBody
+from polycorner.motion.bodies import IMPACT_LAWS, FrictionContact, IdenticalBodies, MovingBody
 from polycorner.motion.contacts import (
     ContactFamily,
     Friction,
@@ -80,9 +80,16 @@ class System(MechanicalSystem, Printed):
     friction : sequence of Friction, optional
         Friction with the surroundings.
     restitution : float or mapping from str to float, optional
-        Newton's coefficient ``0 <= e <= 1``, for all contacts or by name; default 0, plastic.
-        Several contacts at once obey the law together, as in [Moreau]: after the impact
-        ``J_i v+ >= -e_i J_i v-`` with an impulse only where equality holds.
+        Coefficient ``0 <= e <= 1``, for all contacts or by name; default 0, plastic.
+    impact : str, optional
+        What it is the ratio of.  ``"poisson"`` (default): of the impulses of expansion and
+        compression; several contacts go through both phases together ([GP]).  ``"newton"``: of
+        normal velocities, ``J_i v+ >= -e_i J_i v-`` with an impulse only where equality holds
+        ([Moreau]).  With either nothing gains energy: the expansion stops short of that.
+        ``"stronge"``: its square is that of the work of the normal force, for one contact in the
+        plane ([Stronge]); other impacts are Poisson's.  ``"newton unlimited"``: as published, with
+        the energy that friction can make it gain.  Without friction these differ only where
+        contacts of different coefficients are struck at once.
     count : int, optional
         Number of bodies; default 1.
     between : ContactFamily, optional
@@ -143,6 +150,7 @@ class System(MechanicalSystem, Printed):
     hulls: tuple[HullContacts, ...] = ()
     rheonomic: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
     ties: tuple[Tie, ...] = ()
+    impact: str = IMPACT_LAWS[0]
 
     def __repr__(self) -> str:
         """Return the bodies, and the numbers of coordinates, contacts and laws of friction."""
@@ -166,6 +174,7 @@ class System(MechanicalSystem, Printed):
             ("forces on", few(self.forces)),
             ("substrate", few(f"{name} at {x:g}" for name, x in self.substrate.items())),
             ("exits", few(f"{name} > {x:g}" for name, x in self.exits.items())),
+            ("law of impact", self.impact if self.bodies.bounces else ""),
         ]
         pairs = self.bodies.contacts if self.count > 1 else None
         contacts = listed(
@@ -209,6 +218,7 @@ class System(MechanicalSystem, Printed):
             }:
                 refuse("rheonomic", f"a formula in coordinates and the time for {name!r}", e)
         whole("count", self.count, least=1)
+        choice("impact", self.impact, IMPACT_LAWS)
         if self.between is not None:
             names("position", self.between.position, self.manifold.names)
             if len(self.between.position) > 3:
@@ -338,7 +348,8 @@ class System(MechanicalSystem, Printed):
         told = contacts, position, periods_of(self.manifold, position), float(speed)
         names = () if self.scene is None else self.scene.names
         ties = compiled_ties(self.ties, [(self.manifold, self.count)], names)
-        return IdenticalBodies(body, self.count, *told, exit_at, float(limit), names, ties)
+        given = exit_at, float(limit), names, ties, self.impact
+        return IdenticalBodies(body, self.count, *told, *given)
 
     @cached_property
     def _of_hulls(self) -> tuple[list[Call], tuple[FrictionContact, ...], list[Call]]:
@@ -471,6 +482,7 @@ class System(MechanicalSystem, Printed):
             "potential": written(self.potential),
             "count": self.count,
             "restitution": dict(zip(self.contacts, self.restitutions.tolist(), strict=True)),
+            "impact": self.impact,
             "substrate": dict(self.substrate),
             "exits": dict(self.exits),
             "formulas": self.bodies.formula_keys,

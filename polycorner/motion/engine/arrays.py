@@ -38,6 +38,9 @@ STRIPS, AROUND, WATCHED = range(3)
 # What follows if an island is not solved: nothing; shorter steps; halves of this part of a step.
 LAST, DIVIDED, HALVED = range(3)
 
+# Laws of impact, as in IMPACT_LAWS; where nothing bounces none is needed.
+POISSON, NEWTON, STRONGE, UNPROJECTED, PLASTIC = range(5)
+
 # Why compiled code returns.
 DONE, CONTACTS_FULL, EVENTS_FULL, NOT_FINITE = range(4)
 
@@ -119,6 +122,7 @@ class Model(NamedTuple):
     first_gap: Annotated[Any, whole("N+1")]  # of each body's gaps, among all
     first_equation: Annotated[Any, whole("N")]  # of them that is an equation, as all further ones
     equations: Annotated[Any, whole()]  # their number, of all bodies
+    impact: Annotated[Any, whole()]  # POISSON, ...
     restitution: Annotated[Any, real("U")]  # of contacts with surroundings
     families: Annotated[Any, whole()]  # J: of contacts between bodies; 0: none
     family: Annotated[Any, whole("A A")]  # of two bodies, by their kinds; -1: none
@@ -277,6 +281,7 @@ class VelocityWork(NamedTuple):
     free: Annotated[Any, real("N K")]  # velocities after forces alone
     new: Annotated[Any, real("N K")]  # velocities after the step
     rest: Annotated[Any, real("N K")]  # velocities of bodies at which they would be at rest
+    forced: Annotated[Any, real("N K")]  # `free` of the step, while an impact expands
 
 
 class BodyWork(NamedTuple):
@@ -398,6 +403,11 @@ class BlockWork(NamedTuple):
     impulse: Annotated[Any, real("B 2")]
     order: Annotated[Any, whole("B")]  # blocks, island after island
     bounces: Annotated[Any, whole("B")]  # whether a contact bounces
+    returned: Annotated[Any, real("B")]  # normal impulse that is given back in an expansion
+    compressed: Annotated[
+        Any, real("B 2")
+    ]  # impulses of an impact up to the end of its compression
+    expanded: Annotated[Any, real("B 2")]  # all impulses of an impact
     entry: Annotated[Any, whole("B")]  # of a block's two bodies, or -1
 
 

@@ -134,7 +134,7 @@ def new_block(block, b, first, second, rows):
     block.bodies[b, 0], block.bodies[b, 1], block.rows[b] = first, second, rows
     # All that is not set for every kind of block: numbers of blocks change from step to step.
     block.bilateral[b], block.pressing[b], block.bound[b] = ZERO, -1, PLAIN
-    block.load[b] = 0.0
+    block.load[b] = block.returned[b] = 0.0
     for r in range(2):
         block.offset[b, r] = 0.0
         block.impulse[b, r] = 0.0

@@ -4,6 +4,8 @@ from polycorner.motion.engine.arrays import OWN_GAP, TIE_GAP
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 
+INSTANT = 1e-9  # of a step: the shortest part, for an impact
+
 
 @compiled
 def curvature_change(model, gap, before, following, h):
@@ -37,6 +39,15 @@ def acts(model, manner, gap, before, bounce, closed):
 
 
 @compiled
+def will_bounce(model, before, forced, bounce, h):
+    """Return whether a contact that closes bounces, faster than forces close it in a whole step.
+
+    Without this bound a ball would bounce for ever in smaller and smaller arcs.
+    """
+    return before < 0.0 and -bounce * before > abs(forced) * (model.step / h)
+
+
+@compiled
 def least_velocity(model, manner, gap, closed, before, free, change, bounce, h):
     """Return the least normal velocity that a contact allows after the step; whether it bounces.
 
@@ -47,9 +58,7 @@ def least_velocity(model, manner, gap, closed, before, free, change, bounce, h):
         # closed again.
         gap = min(gap, 0.0)
     forced = free - before
-    # A bounce slower than what forces do in a whole step is rest: without this bound a ball would
-    # bounce for ever in smaller and smaller arcs.
-    if gap + h * free < 0.0 and before < 0.0 and -bounce * before > abs(forced) * (model.step / h):
+    if gap + h * free < 0.0 and will_bounce(model, before, forced, bounce, h):
         return 0.5 * (forced - bounce * (free + before)), ONE
     reached = gap + change
     # Depth that is rounding is not corrected: contacts at rest would be pushed apart and fall back.
@@ -70,17 +79,22 @@ def equation_offset(model, gap, change, h):
 
 
 @compiled
-def least_velocity_of(model, state, manner, mid, pair, tie, block, b, free, h):
-    """Return the least normal velocity that the contact of a block allows."""
+def contact_of(model, state, mid, pair, tie, block, b):
+    """Return gap, whether it was closed, and restitution of the contact of a block."""
     i, g = block.origin[b, 1], block.origin[b, 2]
     if block.origin[b, 0] == OWN_GAP:
-        gap, closed, bounce = mid.gap[g], state.touches[g] != 0, model.restitution[g]
-    elif block.origin[b, 0] == TIE_GAP:
-        gap, closed, bounce = tie.gap[g], state.tie_touches[g] != 0, model.tie_restitution[g]
-    else:
-        index = pair.before[i]
-        bounce = model.pair_restitution[family_of(model, block.bodies[b, 0], block.bodies[b, 1])]
-        gap, closed = pair.gap[i], index >= 0 and state.pair_flags[index, 1] != 0
+        return mid.gap[g], state.touches[g] != 0, model.restitution[g]
+    if block.origin[b, 0] == TIE_GAP:
+        return tie.gap[g], state.tie_touches[g] != 0, model.tie_restitution[g]
+    index = pair.before[i]
+    bounce = model.pair_restitution[family_of(model, block.bodies[b, 0], block.bodies[b, 1])]
+    return pair.gap[i], index >= 0 and state.pair_flags[index, 1] != 0, bounce
+
+
+@compiled
+def least_velocity_of(model, state, manner, mid, pair, tie, block, b, free, h):
+    """Return the least normal velocity that the contact of a block allows."""
+    gap, closed, bounce = contact_of(model, state, mid, pair, tie, block, b)
     change, before = -block.load[b], block.before[b, 0]
     least, _ = least_velocity(model, manner, gap, closed, before, free, change, bounce, h)
     return least

@@ -11,6 +11,7 @@ from polycorner.motion.engine.arrays import (
     TIE_FRICTION,
     TIE_GAP,
 )
+from polycorner.motion.engine.bounds import INSTANT, contact_of, will_bounce
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import bodies_of, key_of
@@ -18,7 +19,6 @@ from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rows import sticks
 
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
-INSTANT = 1e-9  # of a step: the shortest part, for an impact
 REST, MOTION, EXIT, FAILED = np.int64(3), np.int64(4), np.int64(5), np.int64(6)
 
 
@@ -67,13 +67,18 @@ def record(log, count, kind, i, j, which, time, value):
 
 
 @compiled
-def classify(model, block, b, was, gap, h, time, out):
-    """Compare a contact with what it was; out: whether it touches, the event or -1, its time."""
+def classify(model, block, b, was, gap, bounce, h, time, out):
+    """Compare a contact with what it was; out: whether it touches, the event or -1, its time.
+
+    One that closes in the next step and bounces there does not touch before.
+    """
     closes = block.load[b] / h
     after = block.after[b, 0] - block.offset[b, 0] - closes
     strikes = block.impulse[b, 0] > 0.0 and block.bounces[b]
     limit = model.parting if was else model.touching
-    touches = gap + h * after <= limit and not strikes
+    forced = block.free[b, 0] - block.before[b, 0]
+    arrives = not was and will_bounce(model, after, forced, bounce, h)
+    touches = gap + h * after <= limit and not (strikes or arrives)
     out[0], out[1], out[2] = 1.0 if touches else 0.0, -1.0, time + h
     if strikes and not was:
         out[1] = IMPACT
@@ -102,20 +107,18 @@ def observe_block(model, state, work, b, h, time, sums):
     if block.rows[b] > 0 or block.bilateral[b]:
         return
     out, share, before = work.scratch.image, h / model.step, block.before[b, 0]
+    gap, was, bounce = contact_of(model, state, work.mid, pair, work.tie, block, b)
     if kind == OWN_GAP:
-        gap, was = work.mid.gap[g], state.touches[g] != 0
         pressed, release = state.pressed[g], state.release[g]
     elif kind == TIE_GAP:
-        gap, was = work.tie.gap[g], state.tie_touches[g] != 0
         pressed, release = state.tie_pressed[g], state.tie_release[g]
     else:
         pair.block_of[i] = b
-        gap, index = pair.gap[i], pair.before[i]
-        was = index >= 0 and state.pair_flags[index, 1] != 0
+        index = pair.before[i]
         pressed = state.pair_impulse[index, 0] if index >= 0 else 0.0
         release = state.pair_release[index] if index >= 0 else time
     sums[PENETRATION] = max(sums[PENETRATION], -gap)
-    classify(model, block, b, was, gap, h, time, out)
+    classify(model, block, b, was, gap, bounce, h, time, out)
     release = release_time(pressed * share, block.impulse[b, 0], release, h, time)
     if out[1] >= 0.0:
         when = out[2]

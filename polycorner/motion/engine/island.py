@@ -2,23 +2,41 @@
 
 import numpy as np
 
+from polycorner.motion.engine import codes
 from polycorner.motion.engine.arrays import (
     DIVIDED,
     ISLANDS,
     LAST,
+    NEWTON,
     NEWTON_STEPS,
     OWN_FRICTION,
+    PLASTIC,
+    POISSON,
     SMALL,
+    STRONGE,
     SWEEPS,
-    TIE_FRICTION,
     TIE_GAP,
 )
+from polycorner.motion.engine.bounds import INSTANT
 from polycorner.motion.engine.continuation import MANY, continue_island
 from polycorner.motion.engine.equilibrium import find_equilibrium
 from polycorner.motion.engine.families import coordinates_of, kind_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses, relax_block, residual
+from polycorner.motion.engine.impacts import (
+    begin_expansion,
+    compress,
+    end_expansion,
+    gain,
+    go_back,
+    has_bounces,
+    mix,
+    only_contact,
+    promise,
+    set_of,
+    strike_alone,
+)
 from polycorner.motion.engine.island_matrix import number_bodies
-from polycorner.motion.engine.jit import ONE, compiled
+from polycorner.motion.engine.jit import NONE, ONE, compiled
 from polycorner.motion.engine.linear_algebra import add_square, solve_spd
 from polycorner.motion.engine.newton import newton_steps
 from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts
@@ -185,7 +203,7 @@ def leave_errors(model, block, first, last, speed):
 
 
 @compiled
-def switch_reversed_slips(model, state, block, search, first, last):
+def switch_reversed_slips(model, block, search, first, last):
     """Give the static set to contacts whose slip reversed; return whether any was switched.
 
     Slip that reverses within a step was zero within it, where the static set decides whether the
@@ -202,13 +220,7 @@ def switch_reversed_slips(model, state, block, search, first, last):
             along += (block.before[b, r] + block.offset[b, r]) * block.after[b, r]
         if along < 0.0:
             search.reversed[b] = 1
-            kind, f = block.origin[b, 0], block.origin[b, 2]
-            if kind == OWN_FRICTION:
-                shape = model.friction_sets[f, 0]
-            elif kind == TIE_FRICTION:
-                shape = model.tie_sets[f, 0]
-            else:
-                shape = model.pair_sets[f, 0]
+            shape = set_of(model, block, b, 0)
             if shape != block.set[b]:
                 block.set[b] = shape
                 found = True
@@ -254,16 +266,69 @@ def solve_island(model, state, work, first, last, again):
         return 0.0
     if at_rest and rests(model, state, work, first, last, speed):
         return residual(model, velocity, block, search, scratch, first, last, 0.0) / speed
-    while True:
-        worst = solve_acting(model, state, work, first, last, speed, again, not at_rest)
-        if worst > model.tolerance * speed or not switch_reversed_slips(
-            model, state, block, search, first, last
-        ):
-            break
+    bounces = model.impact != PLASTIC and has_bounces(block, first, last)
+    if bounces and model.impact in (POISSON, STRONGE):
+        compress(block, first, last)
+    worst = solve_slipping(model, state, work, first, last, speed, again, not at_rest)
     solved = worst <= model.tolerance * speed
     if keeps_grip(model, state, work, first, last, speed, solved):
         worst = residual(model, velocity, block, search, scratch, first, last, 0.0)
+    if model.impact in (POISSON, STRONGE):
+        worst = max(worst, expand_island(model, state, work, first, last, speed, bounces))
+    elif bounces and model.impact == NEWTON:
+        worst = max(worst, limit_island(model, state, work, first, last, speed))
     return worst / speed
+
+
+@compiled
+def solve_slipping(model, state, work, first, last, speed, again, may_rest):
+    """Solve an island, again where slip reverses; return the residual."""
+    while True:
+        worst = solve_acting(model, state, work, first, last, speed, again, may_rest)
+        if worst > model.tolerance * speed or not switch_reversed_slips(
+            model, work.block, work.search, first, last
+        ):
+            return worst
+
+
+@compiled
+def expand_island(model, state, work, first, last, speed, bounces):
+    """Let an island expand after a compression; return the residual of the expansion."""
+    velocity, block, h = work.velocity, work.block, work.shared.times[codes.LENGTH]
+    # As :func:`store_impulses` tells an impact.
+    instant = h / model.step <= INSTANT
+    if not (bounces or instant):
+        return 0.0
+    worst, contact, friction = 0.0, NONE, NONE
+    if model.impact == STRONGE:
+        contact, friction = only_contact(block, first, last)
+    if contact >= 0:
+        strike_alone(model, state, work, first, last, contact, friction)
+    else:
+        lost = gain(model, velocity, block, first, last)
+        if begin_expansion(model, state, work, first, last, h, instant):
+            worst = solve_slipping(model, state, work, first, last, speed, False, False)
+            end_expansion(model, work, first, last)
+            go_back(model, velocity, block, first, last, lost)
+    promise(model, velocity, block, first, last)
+    return worst
+
+
+@compiled
+def limit_island(model, state, work, first, last, speed):
+    """Take back what an impact by Newton's law gains; return the residual of its compression."""
+    velocity, block = work.velocity, work.block
+    if not gain(model, velocity, block, first, last) > 0.0:
+        return 0.0
+    copy_impulses(block, first, last, block.impulse, block.expanded)
+    compress(block, first, last)
+    worst = solve_slipping(model, state, work, first, last, speed, True, False)
+    copy_impulses(block, first, last, block.impulse, block.compressed)
+    lost = gain(model, velocity, block, first, last)
+    mix(model, velocity, block, first, last, 1.0)
+    go_back(model, velocity, block, first, last, lost)
+    promise(model, velocity, block, first, last)
+    return worst
 
 
 @compiled

@@ -7,10 +7,10 @@ import numpy as np
 
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.families import Family
-from polycorner.motion.bodies import IdenticalBodies, MovingBodies, MovingBody
+from polycorner.motion.bodies import IMPACT_LAWS, IdenticalBodies, MovingBodies, MovingBody
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.allocation import filled
-from polycorner.motion.engine.arrays import Model
+from polycorner.motion.engine.arrays import PLASTIC, Model
 from polycorner.motion.engine.sizes import EVENTS, Sizes
 from polycorner.motion.engine.threads import address_of_yield
 from polycorner.motion.formulation import moment
@@ -88,6 +88,7 @@ def model_of(
         "tolerance": solver.tolerance,
         "sweeps": solver.sweeps,
         "refines": solver.refine,
+        "impact": IMPACT_LAWS.index(bodies.impact) if bodies.bounces else PLASTIC,
         "crowd_sweeps": solver.crowd_sweeps,
         "threads": solver.threads,
         "give_way": address_of_yield(),

@@ -11,8 +11,8 @@ there is always an impact, and the parts of a step, each solved for the whole he
 than shorter steps for all.  Crowds, whose steps need not be solved, are not left out.
 """
 
-from polycorner.motion.engine.arrays import CONTACTS, LIMITS, OWN_GAP, TIE_GAP
-from polycorner.motion.engine.bounds import is_slow
+from polycorner.motion.engine.arrays import CONTACTS, LIMITS
+from polycorner.motion.engine.bounds import contact_of, is_slow
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.families import family_of
@@ -126,16 +126,7 @@ def join(forest, i, j):
 @compiled
 def strikes_early(model, state, manner, mid, pair, tie, block, b):
     """Return whether an open contact is pressed, and not slowly, where the bodies are not."""
-    g = block.origin[b, 2]
-    if block.origin[b, 0] == OWN_GAP:
-        gap, closed, bounce = mid.gap[g], state.touches[g] != 0, model.restitution[g]
-    elif block.origin[b, 0] == TIE_GAP:
-        gap, closed, bounce = tie.gap[g], state.tie_touches[g] != 0, model.tie_restitution[g]
-    else:
-        index = pair.before[block.origin[b, 1]]
-        bounce = model.pair_restitution[family_of(model, block.bodies[b, 0], block.bodies[b, 1])]
-        gap = pair.gap[block.origin[b, 1]]
-        closed = index >= 0 and state.pair_flags[index, 1] != 0
+    gap, closed, bounce = contact_of(model, state, mid, pair, tie, block, b)
     if closed or abs(gap) <= model.zero_gap:
         return False
     return not is_slow(model, manner, -block.impulse[b, 0] * block.delassus[b, 0], bounce)

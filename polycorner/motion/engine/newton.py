@@ -85,7 +85,8 @@ def linearise_friction(block, search, b, softness, u):
         d01 = d10 = d11 = 0.0
     if pressing >= 0 and load > 0.0:  # the load changes as well
         # The load of an equation is the magnitude of its impulse, whose sign is in the derivative.
-        per_load = (1.0 if block.impulse[pressing, 0] > 0.0 else -1.0) / load
+        pushes = block.impulse[pressing, 0] > 0.0 or not block.bilateral[pressing]
+        per_load = (1.0 if pushes else -1.0) / load
         change = search.constant[pressing, 0] * per_load
         ex = out[0] - d00 * zx - d01 * zy
         ey = out[1] - d10 * zx - d11 * zy if d == 2 else 0.0

@@ -22,7 +22,8 @@ from polycorner.motion.engine.arrays import (
     SWEEPS,
     UNSOLVED,
 )
-from polycorner.motion.engine.contact_list import FAILED, INSTANT, place_of, record
+from polycorner.motion.engine.bounds import INSTANT
+from polycorner.motion.engine.contact_list import FAILED, place_of, record
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual

@@ -100,7 +100,7 @@ def load_on(block, b):
     pressing = block.pressing[b]
     if pressing < 0:
         return block.load[b]
-    p = block.impulse[pressing, 0]
+    p = block.impulse[pressing, 0] + block.returned[pressing]
     return -p if p < 0.0 and block.bilateral[pressing] else p
 
 
