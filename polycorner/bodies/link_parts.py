@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
 
-from polycorner.bodies.shapes import Body, Part
+from polycorner.bodies.shapes import Body, Part, hull_distance
 from polycorner.formulas.families import Family
 from polycorner.tolerances import DEFAULT
 
@@ -49,14 +48,7 @@ def affine() -> Family:
 
 
 def touch(one: Part, two: Part) -> bool:
-    """Whether two parts overlap or touch, by the least difference of points of their hulls.
-
-    With the differences ``p`` of vertices, ``sum_i x_i p_i`` divided by ``sum_i x_i`` is the least
-    where ``|sum_i x_i p_i|^2 + (sum_i x_i - 1)^2`` is, over all ``x >= 0`` ([LawsonHanson] ch. 23).
-    """
+    """Whether two parts overlap or touch."""
     size = max(float(np.ptp(np.concatenate([one.points, two.points]), axis=0).max()), one.radius)
-    differences = (one.points[:, None] - two.points).reshape(-1, 3) / (size + two.radius)
-    rows = np.vstack([differences.T, np.ones(len(differences))])
-    weights, _ = nnls(rows, np.array([0.0, 0.0, 0.0, 1.0]))
-    least = float(np.linalg.norm(differences.T @ weights)) / float(weights.sum())
-    return least <= (one.radius + two.radius) / (size + two.radius) + DEFAULT.same
+    radius = one.radius + two.radius
+    return hull_distance(one.points, two.points) <= radius + DEFAULT.same * (size + two.radius)

@@ -157,12 +157,12 @@ def apart(manifold: Manifold, one: PlacedPart, two: PlacedPart, *, excluded: boo
     if both_sharp(one, two):
         return separated(manifold, one, two)
     parts: list[Tree] = [touch.gap for touch in distances(manifold, one, two)]
-    if excluded and _can_cross(one, two):
+    if excluded and can_cross(one, two):
         parts.append(separated(manifold, one, two))
     return parts[0] if len(parts) == 1 else AllOf(*parts)
 
 
-def _can_cross(one: PlacedPart, two: PlacedPart) -> bool:
+def can_cross(one: PlacedPart, two: PlacedPart) -> bool:
     """Whether the distances are also large for hulls that cross; not of two rods in space."""
     if min(len(one.part.points), len(two.part.points)) == 1 or _are_parallel(one, two):
         return False

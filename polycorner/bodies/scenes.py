@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from polycorner.bodies.pairs import PlacedPart, Touch
+from polycorner.bodies.frames import Frame
+from polycorner.bodies.pairs import PlacedPart, Touch, can_cross
 from polycorner.bodies.poses import Placement
-from polycorner.bodies.shapes import Facets
+from polycorner.bodies.shapes import Facets, hull_distance
 from polycorner.bodies.slips import rolling_arm
 from polycorner.bodies.walls import HalfSpace, Wall, WallTouch
 from polycorner.bodies.waves import waves
@@ -78,6 +79,48 @@ class BodiesInSpace(Scene):
     @cached_property
     def _at_walls(self) -> dict[str, WallTouch]:
         return {touch.gap.name: touch for touch in self.at_walls}
+
+    @cached_property
+    def lever(self) -> Array:  # type: ignore[override] # it is not written
+        """How far a unit of each coordinate turns points of the hulls of a body.
+
+        An angle by their distance from the origin, a quaternion by twice that.
+        """
+        found = []
+        for p in self.placements:
+            far = max(float(np.linalg.norm(m.points, axis=1).max()) for m in p.body.parts.values())
+            turn = {Frame.SHIFTED: 0.0, Frame.ROTATED: 2 * far}.get(p.frame, far)
+            d = p.body.dimension
+            found += d * [0.0] + (p.manifold.size - d) * [turn]
+        return np.array(found)
+
+    @cached_property
+    def can_cross(self) -> bool:  # type: ignore[override] # it is not written
+        """Whether two of the bodies, or one and a fixed body, may cross unnoticed by gaps."""
+        return any(self._crossing.values())
+
+    @cached_property
+    def _crossing(self) -> dict[int, list[tuple[Touch, Mapping[str, Placement]]]]:
+        """Contacts of parts that may cross, of one body and of two, one for each pair of parts."""
+        found: dict[int, dict[frozenset[str], tuple[Touch, Mapping[str, Placement]]]]
+        found = {1: {}, 2: {}}
+        for t, placements in self._between.values():
+            if can_cross(t.one, t.two):
+                several = self.count > 1 and bool(t.one.coordinates and t.two.coordinates)
+                found[1 + several][frozenset((t.one.name, t.two.name))] = t, placements
+        return {n: [*pairs.values()] for n, pairs in found.items()}
+
+    def crossed(self, bodies: tuple[int, ...], q: Array) -> tuple[str, ...]:
+        """Return the names of two that cross each other; empty if none do."""
+        own = q[list(bodies)].ravel()
+        for t, placements in self._crossing[len(bodies)]:
+            first = _placed(t.one, t.one.part.points, placements, own)
+            second = _placed(t.two, t.two.part.points, placements, own)
+            away = _to_image(t.one, t.two, placements, own)
+            size = float(np.ptp(first, axis=0).max())
+            if hull_distance(first, second + away) <= DEFAULT.same * size:
+                return self._called(t.one, bodies), self._called(t.two, bodies)
+        return ()
 
     def parties(self, bodies: tuple[int, ...], contact: str) -> tuple[str, ...]:
         """Return the names of the two that touch at a contact of bodies; empty if not known."""
@@ -175,6 +218,12 @@ class KindsInSpace(Scene):
         return frozenset().union(*(one.walls for one in self.alone.values()))
 
     @cached_property
+    def can_cross(self) -> bool:  # type: ignore[override] # it is not written
+        """Whether there are bodies other than discs and balls."""
+        every = [p.body for one in self.alone.values() for p in one.placements]
+        return any(len(part.points) > 1 for body in every for part in body.parts.values())
+
+    @cached_property
     def _kinds(self) -> list[str]:
         return [kind for kind, n in self.count.items() for _ in range(n)]
 
@@ -206,12 +255,21 @@ class KindsInSpace(Scene):
         ours = (self.names[i] for i in bodies)
         return dict(zip(self._alone(bodies).names, ours, strict=True))
 
+    def crossed(self, bodies: tuple[int, ...], q: Array) -> tuple[str, ...]:
+        """Return the names of two that cross each other; empty if none do."""
+        called = self._called(bodies)
+        found = self._alone(bodies).crossed((0,), self._places(bodies, q))
+        return tuple(called.get(n, n) for n in found)
+
+    def _places(self, bodies: tuple[int, ...], q: Array) -> Array:
+        """Return the coordinates of bodies by themselves, ``(1, k)``."""
+        sizes = [p.manifold.size for p in self._alone(bodies).placements]
+        return np.concatenate([q[i, :n] for i, n in zip(bodies, sizes, strict=True)])[None]
+
     def site(self, bodies: tuple[int, ...], contact: str, q: Array) -> Site | None:
         """Return where a contact of bodies is; None if it is not known."""
         scene = self._alone(bodies)
-        sizes = [p.manifold.size for p in scene.placements]
-        own = np.concatenate([q[i, :n] for i, n in zip(bodies, sizes, strict=True)])
-        found = scene.site((0,), contact, own[None])
+        found = scene.site((0,), contact, self._places(bodies, q))
         if found is None:
             return None
         called = self._called(bodies)

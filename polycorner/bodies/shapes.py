@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import nnls
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
@@ -110,6 +111,19 @@ def _round(members: tuple[int, ...], normal: Array, points: Array) -> tuple[int,
     first = away[0] / np.linalg.norm(away[0])
     angles = np.arctan2(away @ np.cross(normal, first), away @ first)
     return tuple(members[i] for i in np.argsort(angles).tolist())
+
+
+def hull_distance(first: Array, second: Array) -> float:
+    """Return the distance of the hulls of points ``(k, d)`` and ``(l, d)``.
+
+    With the differences ``p`` of vertices, ``sum_i x_i p_i`` divided by ``sum_i x_i`` is the least
+    where ``|sum_i x_i p_i|^2 + (sum_i x_i - 1)^2`` is, over all ``x >= 0`` ([LawsonHanson] ch. 23).
+    """
+    differences = (first[:, None] - second).reshape(-1, first.shape[1])
+    size = float(abs(differences).max()) or 1.0
+    rows = np.vstack([differences.T / size, np.ones(len(differences))])
+    weights, _ = nnls(rows, np.append(np.zeros(first.shape[1]), 1.0))
+    return float(np.linalg.norm(differences.T @ weights)) / float(weights.sum())
 
 
 @dataclass(frozen=True, eq=False)

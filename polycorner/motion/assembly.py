@@ -245,6 +245,7 @@ class Assembly(MechanicalSystem):
             check_contacts(kind.polyhedron, places, partial(self._who, name))
             check_equations(kind.polyhedron, places, called)
         self.bodies.check_apart(self.bodies.padded(q))
+        self.bodies.check_crossed(self.bodies.padded(q), self.scene)
 
     def _called(self, name: str) -> Callable[[int], str]:
         """Return what gives the bodies of a kind their names in messages."""

@@ -12,7 +12,7 @@ from polycorner.formulas.families import Family
 from polycorner.motion.convex_sets import ConvexSet, in_words
 from polycorner.motion.formulation import Formulation
 from polycorner.motion.noise import OPTIONS
-from polycorner.motion.scenes import Rubbing
+from polycorner.motion.scenes import Rubbing, Scene
 from polycorner.motion.tie_forms import NO_TIES, Ties
 from polycorner.printing import number
 from polycorner.spaces.manifold import Array
@@ -74,6 +74,9 @@ class MovingBody(Value):
         Length by which gaps are scaled.
     equations : int
         How many of the gaps are equations: they remain zero, by forces of either sign.
+    lever : (k,) array
+        How far a unit of each coordinate turns points of the hulls, rounded or not, that the gaps
+        are distances of, beside what moves all of them alike; empty where gaps are others.
     signals : Family, optional
         Functions of the time, computed once a step for all bodies.  Their values are the parameters
         of the formulation that follow the time.
@@ -93,6 +96,7 @@ class MovingBody(Value):
     units: Array
     gap_unit: float
     equations: int = 0
+    lever: Array = field(default_factory=lambda: np.empty(0))
     signals: Family | None = None
     signal_parameters: Array = field(default_factory=lambda: np.empty(0))
     slow_signals: bool = False
@@ -386,6 +390,23 @@ class MovingBodies(Value):
                 f"{-gap:.6g} at contact {name!r}"
             )
             raise ValueError(msg)
+
+    def check_crossed(self, q: Array, scene: Scene | None) -> None:
+        """Raise ValueError if two bodies cross each other, or one and a fixed body.
+
+        ``q`` as below.  Only a scene knows of this.
+        """
+        if scene is None or not scene.can_cross:
+            return
+        some = [(i,) for i in range(self.total)]
+        for bodies in (*some, *(pair for pair, _, _ in self.near_pairs(q))):
+            if names := scene.crossed(bodies, q):
+                one, two = names
+                msg = (
+                    f"q: expected a placement without overlap; bodies {one!r} and {two!r} cross "
+                    f"each other"
+                )
+                raise ValueError(msg)
 
     def least_pair_gap(self, q: Array) -> tuple[float, tuple[int, int], str]:
         """Return the least gap between two bodies, the bodies, and the contact.

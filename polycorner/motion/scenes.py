@@ -56,10 +56,25 @@ class Scene(Value, ABC):
         Of all bodies that move; of a dense system of those that it consists of.
     walls : frozenset of str
         Which names are those of walls.
+    can_cross : bool
+        Whether two of them may cross each other without a gap that is negative.
     """
 
     names: tuple[str, ...]
     walls: frozenset[str]
+    can_cross: bool
+
+    @property
+    def lever(self) -> Array:
+        """How far a unit of each coordinate turns points of a body, as of a ``MovingBody``."""
+        return np.empty(0)
+
+    @abstractmethod
+    def crossed(self, bodies: tuple[int, ...], q: Array) -> tuple[str, ...]:
+        """Return the names of two that cross each other: of a body and what is fixed, or of two.
+
+        Distances of the features of rods in the plane, and of rounded hulls, are large there.
+        """
 
     @abstractmethod
     def parties(self, bodies: tuple[int, ...], contact: str) -> tuple[str, ...]:

@@ -337,6 +337,7 @@ class System(MechanicalSystem, Printed):
             1 / scales,
             gap_unit(self.manifold),
             equations,
+            np.empty(0) if self.scene is None else self.scene.lever,
         )
         between = self.between if self.count > 1 else None
         given = () if self.between is None else self.between.position
@@ -412,6 +413,7 @@ class System(MechanicalSystem, Printed):
         check_equations(self.polyhedron, q, self.bodies.called)
         self._check_hulls(q)
         self.bodies.check_apart(q.reshape(self.count, -1))
+        self.bodies.check_crossed(q.reshape(self.count, -1), self.scene)
 
     def _who(self, contact: str, i: int) -> str:
         """Return what overlaps at a contact with the surroundings, for a message."""

@@ -146,6 +146,7 @@ class Model(NamedTuple):
     position: Annotated[Any, whole("A 3")]  # coordinates that are a body's position, or -1
     period: Annotated[Any, real("3")]  # after which it repeats, as lengths, or inf
     units: Annotated[Any, real("A k")]  # length of a unit of each coordinate
+    lever: Annotated[Any, real("A k")]  # how far a unit of each coordinate turns points of a body
     substrate_coordinate: Annotated[Any, whole("A")]  # along which the substrate moves
     substrate_speed: Annotated[Any, real()]  # along the first component of the position
     exit_coordinate: Annotated[Any, whole("A")]  # or -1

@@ -10,9 +10,9 @@ An impact has two phases.  In the *compression* contacts are plastic: it ends wi
   and the expansion ends when the normal impulse has given back ``e^2`` of the work that it took in
   the compression ([Stronge]).
 
-The first two may gain energy, Newton's with friction, Poisson's where coefficients differ.  Then the
-velocities are ``v_C + s (v+ - v_C)`` with the greatest ``s`` at which nothing is gained.  Impulses
-remain in their cones and gaps closed or opening, for both are convex.
+The first two may gain energy, Newton's with friction, Poisson's where coefficients differ.  Then
+the velocities are ``v_C + s (v+ - v_C)`` with the greatest ``s`` at which nothing is gained.
+Impulses remain in their cones and gaps closed or opening, for both are convex.
 """
 
 import numpy as np
@@ -60,7 +60,7 @@ def forced(block, b):
 
 @compiled
 def compress(block, first, last):
-    """Let the contacts that bounce be plastic: their velocity vanishes in the middle of the step."""
+    """Let contacts that bounce be plastic: their velocity vanishes in the middle of the step."""
     for s in range(first, last):
         b = block.order[s]
         if is_unilateral(block, b) and block.bounces[b] and block.bound[b] != BENT:
@@ -196,7 +196,7 @@ def mix(model, velocity, block, first, last, s):
 
 @compiled
 def only_contact(block, first, last):
-    """Return the contact of an impact of one contact in the plane, or -1, and its friction or -1."""
+    """Return the only contact of an impact in the plane, or -1, and its friction, or -1."""
     contact, friction = NONE, NONE
     for s in range(first, last):
         b = block.order[s]

@@ -52,9 +52,11 @@ def model_of(
         )
         raise NotImplementedError(msg)
     units, kicks = np.ones((sizes.A, sizes.k)), np.zeros((sizes.A, sizes.k))
+    lever = np.zeros((sizes.A, sizes.k))
     for a, kind in enumerate(bodies.kinds):
         names = kind.body.formulation.coordinates
         units[a, : kind.dimension] = kind.body.units
+        lever[a, : len(kind.body.lever)] = kind.body.lever
         kicks[a, : kind.dimension] = [noise.kicks.get(name, 0.0) for name in names]
     values = {
         "bodies": sizes.N,
@@ -75,6 +77,7 @@ def model_of(
         "follows_velocity": any(known["follows_velocity"] for known in dependence)
         or any(form.damped for form in bodies.ties.forms),
         "units": units,
+        "lever": lever,
         "kicks": kicks,
         "period": (*bodies.period, np.inf)[:3],
         "substrate_speed": bodies.substrate_speed,

@@ -20,16 +20,20 @@ from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.neighbours import bodies_of, speed_of, travel
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import (
+    CLEAR,
     FULL,
     MIDDLE,
     NEXT,
     START,
     equations_fail,
+    first_dip,
     gaps_at,
+    may_dip,
     may_vanish,
     stay_apart,
     tie_code,
     touching,
+    turning,
 )
 from polycorner.motion.engine.ties import form_of
 
@@ -181,14 +185,62 @@ def body_misses(model, state, work, i, h):
             rate = rate_of(model, mid.gradient, state.v, i, g)
             if may_vanish(path.gap[g], before, f, rate, 0.5 * h, model.zero_gap):
                 return True
+    return body_turns_into(model, state, work, i, deep, h)
+
+
+@compiled
+def body_turns_into(model, state, work, i, deep, h):
+    """Return whether a body that turns meets its surroundings on the way, or may do so."""
+    mid, velocity, path, scratch = work.mid, work.velocity, work.path, work.scratch
+    first, out = model.first_gap[i], scratch.image
+    turn, before = turning(model, velocity.new, i, NONE, h), turning(model, state.v, i, NONE, h)
+    if turn == 0.0 and before == 0.0:
+        return False
+    if not state.watched[i]:
+        gaps_at(model, path, scratch, state.q, state.v, i, NONE, 0.0, START)
+    for g in range(first, model.first_equation[i]):
+        rate = rate_of(model, mid.gradient, velocity.new, i, g)
+        if state.touches[g]:
+            continue
+        if mid.gap[g] > -model.zero_gap and may_dip(mid.gap[g], rate, turn, h, deep):
+            known, _ = first_dip(
+                model, path, scratch, mid.q, velocity.new, i, NONE, g - first, h, turn, deep, out
+            )
+            if known != CLEAR:
+                return True
+        f, rate = scratch.way_gap[START, g - first], scratch.way_rate[START, g - first]
+        if not state.watched[i] and f > 0.0 and may_dip(f, rate, before, 0.5 * h, deep):
+            known, _ = first_dip(
+                model,
+                path,
+                scratch,
+                state.q,
+                state.v,
+                i,
+                NONE,
+                g - first,
+                0.5 * h,
+                before,
+                deep,
+                out,
+            )
+            if known != CLEAR:
+                return True
     return False
 
 
 @compiled
-def pair_misses(model, state, mid, velocity, path, scratch, i, j, h):
-    """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`."""
-    gap, rate, zero = scratch.way_gap, scratch.way_rate, model.zero_gap
-    deep, watched = 2.0 * model.bending * model.gap_unit, state.watched[i] and state.watched[j]
+def pair_misses(model, state, mid, velocity, path, scratch, i, j, large, h):
+    """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`.
+
+    In a ``large`` island they may, unless they pass through each other.
+    """
+    gap, rate, zero, out = scratch.way_gap, scratch.way_rate, model.zero_gap, scratch.image
+    watched = state.watched[i] and state.watched[j]
+    deep, lower = 2.0 * model.bending * model.gap_unit, 0.0
+    if large:
+        deep = lower = model.gap_unit
+    turn, before = turning(model, velocity.new, i, j, h), turning(model, state.v, i, j, h)
     gaps_at(model, path, scratch, mid.q, velocity.new, i, j, 0.0, NEXT)
     gaps_at(model, path, scratch, mid.q, velocity.new, i, j, h, FULL)
     if not watched:
@@ -196,10 +248,22 @@ def pair_misses(model, state, mid, velocity, path, scratch, i, j, h):
         gaps_at(model, path, scratch, state.q, state.v, i, j, 0.5 * h, MIDDLE)
     for g in range(model.pair_gaps[family_of(model, i, j)]):
         f0, rate0, f1, rate1 = gap[NEXT, g], rate[NEXT, g], gap[FULL, g], rate[FULL, g]
-        misses = f0 > -zero and may_vanish(open_gap(model, f0), rate0, f1, rate1, h, deep)
+        misses = f0 > -zero and may_vanish(
+            open_gap(model, f0) + lower, rate0, f1 + lower, rate1, h, deep - lower
+        )
+        if f0 > -zero and not misses and may_dip(f0, rate0, turn, h, deep):
+            known, _ = first_dip(
+                model, path, scratch, mid.q, velocity.new, i, j, g, h, turn, deep, out
+            )
+            misses = known != CLEAR
         if not watched and not misses:
             f0, rate0, f1, rate1 = gap[START, g], rate[START, g], gap[MIDDLE, g], rate[MIDDLE, g]
-            misses = f0 > 0.0 and may_vanish(f0, rate0, f1, rate1, 0.5 * h, zero)
+            misses = f0 > 0.0 and may_vanish(f0 + lower, rate0, f1 + lower, rate1, 0.5 * h, zero)
+            if f0 > 0.0 and not misses and may_dip(f0, rate0, before, 0.5 * h, deep):
+                known, _ = first_dip(
+                    model, path, scratch, state.q, state.v, i, j, g, 0.5 * h, before, deep, out
+                )
+                misses = known != CLEAR
         # Asked last: the search in the list of contacts costs more than the rest, and misses are
         # rare.
         if misses and not touching(model, state, i, j, g):
@@ -218,7 +282,8 @@ def mark_misses(model, state, work, left, h):
                 continue
             if body_misses(model, state, work, i, h):
                 left[island.parent[i]] |= 1
-    slow = model.near_many * model.gap_unit
+    # What moves by less than the thickness of the thinnest body cannot pass through any.
+    slow = min(model.near_many * model.gap_unit, 1.0)
     if model.families == 0 or 2.0 * travel(model, body, h) <= slow:
         return
     for s in range(neighbours.status[0]):
@@ -227,16 +292,16 @@ def mark_misses(model, state, work, left, h):
             continue
         way = h * (body.speed[i] + body.speed[j])
         large = is_large(island, island.parent[i]) and is_large(island, island.parent[j])
-        if way <= slow or large:
+        if way <= (1.0 if large else slow):
             continue
         way = max(way, 0.5 * h * (speed_of(model, state.v, i) + speed_of(model, state.v, j)))
-        if neighbours.least_gap[s] > 2.0 * way:
+        if neighbours.least_gap[s] > 2.0 * way * max(1.0, model.gap_unit):
             continue
         if not stay_apart(model, state, mid, velocity, i, j, h) and pair_misses(
-            model, state, mid, velocity, path, scratch, i, j, h
+            model, state, mid, velocity, path, scratch, i, j, large, h
         ):
-            left[island.parent[i]] |= 1
-            left[island.parent[j]] |= 1
+            left[island.parent[i]] |= 2 if large else 1
+            left[island.parent[j]] |= 2 if large else 1
 
 
 @compiled

@@ -9,6 +9,14 @@ that after it.  On a segment a gap ``f`` is a function of time.  Between its end
 
 The first zero is found by Newton's method from the start, which for a convex function approaches
 it from above, with bisection where there is a bracket.
+
+The distance of two convex bodies is convex where they do not turn.  Where they do, with the angular
+velocities ``w`` and points within the lengths ``r`` of their origins, the approach of any two
+points along the normal at hand is at most that of the nearest ones and ``turn = 2 sum r |w|``:
+
+    ``f(t + s) >= f(t) + (f'(t) - turn) s``.
+
+By steps of this bound, as in conservative advancement, a path is followed past which nothing slips.
 """
 
 import numpy as np
@@ -16,7 +24,7 @@ import numpy as np
 from polycorner.motion.engine.arrays import LIMITS, ROWS
 from polycorner.motion.engine.bounds import acts
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair
-from polycorner.motion.engine.families import family_of, pair_inputs
+from polycorner.motion.engine.families import family_of, kind_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.neighbours import (
     component,
@@ -28,6 +36,8 @@ from polycorner.motion.engine.ties import evaluate_tie, form_of, rate_of_row, ro
 
 MOST_SEARCH = 80  # evaluations in the search for one contact
 NEVER = np.inf
+# What is known of a segment: it is free; up to an instant at which a gap is below zero; up to one.
+CLEAR, DIPS, UNSURE = np.int64(0), np.int64(1), np.int64(2)
 
 # Rows of what is evaluated on the way: at the start and at the midpoint with the velocity before;
 # at the midpoint, half a step later and at the next midpoint with that after; in a search.
@@ -130,11 +140,65 @@ def may_vanish(f0, rate0, f1, rate1, duration, slack):
 
 
 @compiled
-def first_zero(model, path, scratch, base, velocity, i, j, g, duration, slack, out):
-    """Return when an open gap first vanishes on a segment, up to ``slack``.
+def turning(model, v, i, j, duration):
+    """Return by how much more two points of bodies may approach in a time than the nearest do.
+
+    ``j < 0`` stands for surroundings, which do not turn.
+    """
+    speed, rate = 0.0, 0.0
+    for side in range(2 if j >= 0 else 1):
+        body = j if side else i
+        for c in range(model.dimension):
+            lever = model.lever[kind_of(model, body), c]
+            if lever > 0.0:
+                speed += abs(v[body, c]) * lever
+                rate += abs(v[body, c])
+    # On a straight path quaternions grow, and with them the matrices that they stand for.
+    return 2.0 * speed * (1.0 + duration * rate)
+
+
+@compiled
+def may_dip(f, rate, turn, duration, deep):
+    """Return whether a gap may be below ``-deep`` on a segment, by the bound for what turns."""
+    return turn > 0.0 and f + (rate - turn) * duration < -deep
+
+
+@compiled
+def first_dip(model, path, scratch, base, velocity, i, j, g, duration, turn, deep, out):
+    """Follow an open gap along a segment; return what is known of it, and up to which instant.
+
+    Dips down to ``deep`` may be overlooked.
+    """
+    t = 0.0
+    for _ in range(MOST_SEARCH):
+        gap_at(model, path, scratch, base, velocity, i, j, g, t, out)
+        if out[0] < -0.5 * deep:
+            return DIPS, t
+        if not may_dip(out[0], out[1], turn, duration - t, deep):
+            return CLEAR, duration
+        t += (out[0] + deep) / (turn - out[1])
+    return UNSURE, t
+
+
+@compiled
+def first_zero(model, path, scratch, base, velocity, i, j, g, duration, turn, slack, out):
+    """Return when an open gap first vanishes on a segment, up to ``slack``, or a time before that.
 
     One that vanishes at the start is met if it falls there, and else once it has opened.
     """
+    known = CLEAR
+    if turn > 0.0:
+        deep = 2.0 * model.bending * model.gap_unit
+        known, duration = first_dip(
+            model, path, scratch, base, velocity, i, j, g, duration, turn, deep, out
+        )
+    t = convex_zero(model, path, scratch, base, velocity, i, j, g, duration, slack, out)
+    return duration if known == UNSURE and t == NEVER else t
+
+
+@compiled
+def convex_zero(model, path, scratch, base, velocity, i, j, g, duration, slack, out):
+    """Return when an open gap that is convex, or below zero at the end, first vanishes."""
     gap_at(model, path, scratch, base, velocity, i, j, g, duration, out)
     f1, rate1 = out[0], out[1]
     gap_at(model, path, scratch, base, velocity, i, j, g, 0.0, out)
@@ -183,26 +247,35 @@ def touching(model, state, i, j, g):
 
 
 @compiled
-def first_in_gap(model, state, mid, velocity, path, scratch, i, j, g, acting, h, out):
+def first_in_gap(model, state, mid, velocity, path, scratch, i, j, g, acting, turns, h, out):
     """Return when in a step an open gap vanishes; one that acts may do so after its middle.
+
+    ``turns`` are :func:`turning` before and after the middle.
 
     Its values on the way, as in :func:`look_ahead`, exclude most gaps at once.
     """
     slack, half, t = model.zero_gap, 0.5 * h, NEVER
-    if may_meet(scratch, g, START, MIDDLE, half, slack):
-        t = first_zero(model, path, scratch, state.q, state.v, i, j, g, half, slack, out)
+    if may_meet(model, scratch, g, START, MIDDLE, half, turns[0], slack):
+        t = first_zero(model, path, scratch, state.q, state.v, i, j, g, half, turns[0], slack, out)
     # What acts is kept from closing by its impulse; only others can be met with the new velocity.
-    if t == NEVER and not acting and may_meet(scratch, g, NEXT, HALF, half, slack):
-        t = half + first_zero(model, path, scratch, mid.q, velocity.new, i, j, g, half, slack, out)
+    if t == NEVER and not acting and may_meet(model, scratch, g, NEXT, HALF, half, turns[1], slack):
+        t = half + first_zero(
+            model, path, scratch, mid.q, velocity.new, i, j, g, half, turns[1], slack, out
+        )
     return t
 
 
 @compiled
-def may_meet(scratch, g, first, last, duration, slack):
+def may_meet(model, scratch, g, first, last, duration, turn, slack):
     """Return whether a gap may vanish between two rows, or does so at the first."""
     gap, rate = scratch.way_gap, scratch.way_rate
     f0, rate0, f1, rate1 = gap[first, g], rate[first, g], gap[last, g], rate[last, g]
-    return f0 <= slack or may_vanish(f0, rate0, f1, rate1, duration, slack)
+    deep = 2.0 * model.bending * model.gap_unit
+    return (
+        f0 <= slack
+        or may_vanish(f0, rate0, f1, rate1, duration, slack)
+        or may_dip(f0, rate0, turn, duration, deep)
+    )
 
 
 @compiled
@@ -251,6 +324,7 @@ def acceptable_to(model, state, work, i, j, h, out):
     path, scratch = work.path, work.scratch
     deep, length, sunk = 2.0 * model.bending * model.gap_unit, h, False
     missed = h * model.tolerance * work.body.island_speed[i]  # shorter parts miss no less
+    turns = (turning(model, state.v, i, j, h), turning(model, velocity.new, i, j, h))
     look_ahead(model, state, mid, velocity, path, scratch, i, j, h)
     first, family = model.first_gap[i], NONE if j < 0 else family_of(model, i, j)
     for g in range(model.first_gap[i + 1] - first if j < 0 else model.pair_gaps[family]):
@@ -264,7 +338,9 @@ def acceptable_to(model, state, work, i, j, h, out):
         if not closed:
             length = min(
                 length,
-                first_in_gap(model, state, mid, velocity, path, scratch, i, j, g, acting, h, out),
+                first_in_gap(
+                    model, state, mid, velocity, path, scratch, i, j, g, acting, turns, h, out
+                ),
             )
         if acting:
             following = scratch.way_gap[FULL, g]
@@ -304,7 +380,7 @@ def acceptable_to_tie(model, state, work, t, h, out):
         acting = acts(model, manner, near, rate, bounce, closed)
         if not closed:
             first = first_in_gap(
-                model, state, mid, velocity, path, scratch, i, code, g, acting, h, out
+                model, state, mid, velocity, path, scratch, i, code, g, acting, (0.0, 0.0), h, out
             )
             length = min(length, first)
         if acting:
