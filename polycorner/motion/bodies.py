@@ -401,7 +401,7 @@ class MovingBodies(Value):
         some = [(i,) for i in range(self.total)]
         for bodies in (*some, *(pair for pair, _, _ in self.near_pairs(q))):
             if names := scene.crossed(bodies, q):
-                one, two = names
+                one, two = sorted(names)
                 msg = (
                     f"q: expected a placement without overlap; bodies {one!r} and {two!r} cross "
                     f"each other"
