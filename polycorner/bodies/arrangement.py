@@ -387,8 +387,9 @@ class Arrangement(Checked, Printed):
             own = {name for one in alone.values() for name in one.joints}
             held = {name: joint for name, joint in self.joints.items() if name not in own}
             held |= self._further(joints)
-            rest = {"gravity": gravity, "density": density, "impact": impact}
-            return assembly(alone, count, given, further, held, **rest)
+            return assembly(
+                alone, count, given, further, held, gravity=gravity, density=density, impact=impact
+            )
         if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
             refuse("count", "1, or numbers by name, for several bodies", count)
         if len(self.placements) > 1:

@@ -448,8 +448,9 @@ class Robot(Checked):
         checks.names("torques", given, self._tree.free)
         driven = link_laws.forces(self.joints, self._rates, given)
         laws = (*link_laws.joint_friction(self.joints, self._rates), *self._wall_friction(friction))
-        bounces = {"restitution": restitution, "impact": impact}
-        return System(polyhedron, kinetic, potential, driven, laws, **bounces)
+        return System(
+            polyhedron, kinetic, potential, driven, laws, restitution=restitution, impact=impact
+        )
 
     def _wall_friction(self, given: float | Mapping[str, float]) -> Iterator[Friction]:
         """Yield the friction of links and bodies at half-spaces."""

@@ -81,7 +81,7 @@ class BodiesInSpace(Scene):
         return {touch.gap.name: touch for touch in self.at_walls}
 
     @cached_property
-    def lever(self) -> Array:  # type: ignore[override] # it is not written
+    def lever(self) -> Array:
         """How far a unit of each coordinate turns points of the hulls of a body.
 
         An angle by their distance from the origin, a quaternion by twice that.

@@ -41,8 +41,8 @@ def bouncing_ball(restitution: float = 1.0, impact: str = "poisson") -> System:
     """
     M = Manifold.euclidean("y", unit="m")
     (y,), (v,) = M.symbols, velocities(M)
-    bounces = {"restitution": restitution, "impact": impact}
-    return System(Polyhedron(M, {"floor": y}), v**2 / 2, GRAVITY * y, **bounces)
+    floor = Polyhedron(M, {"floor": y})
+    return System(floor, v**2 / 2, GRAVITY * y, restitution=restitution, impact=impact)
 
 
 def sliding_block(
@@ -189,8 +189,8 @@ def newtons_cradle(balls: int, restitution: float = 1.0, impact: str = "poisson"
     (x1,), (x2,) = pair_coordinates(M)
     apart = ContactFamily({"balls": sympy.Abs(x2 - x1) - 1}, reach=1.0, restitution=restitution)
     ends = Polyhedron(M, {"left": END + x, "right": END - x})
-    many = {"count": balls, "between": apart, "impact": impact}
-    return System(ends, v**2 / 2, sympy.Integer(0), **many)
+    rest = sympy.Integer(0)
+    return System(ends, v**2 / 2, rest, count=balls, between=apart, impact=impact)
 
 
 def dispersing_billiard(radius: float = 0.5) -> System:

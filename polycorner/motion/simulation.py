@@ -10,8 +10,8 @@ From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the ha
     p_b in L_b C_b   and   -(B_b v+ + d_b) normal to L_b C_b at p_b
 
 ======================================  =====================================================
-``bound_i = d / 2 - e_i (J_i v          contact ``i`` closes in this step and bounces;
-+ d / 2)``                              ``d = J_i (v_free - v)``
+``bound_i = d / 2 - e_i (J_i v          contact ``i`` closes in this step and bounces by
++ d / 2)``                              Newton's law; ``d = J_i (v_free - v)``
 ``bound_i = -(gap_i + c_i) / h``        otherwise: it may just be reached ([StewartTrinkle]);
                                         what overlaps is pushed out no faster than what forces
                                         and curvature do within a step, ``|J_i (v_free - v)|``
@@ -42,6 +42,9 @@ equations.  Of equations that follow from others, the later ones carry no force.
 
 Slip that reverses within a step was zero within it, and there it is the static set that decides
 whether it starts again: such a step is solved anew with the static set.
+
+By other laws of impact an island in which contacts bounce is solved twice, with ``e_i = 0`` and for
+the expansion that follows: :mod:`polycorner.motion.engine.impacts`.
 
 A contact bounces if it approaches and would leave faster than the forces bring it back within
 the step, ``e |J v| > |J (v_free - v)|``; what bounces more slowly than that is at rest within

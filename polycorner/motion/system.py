@@ -83,12 +83,12 @@ class System(MechanicalSystem, Printed):
         Coefficient ``0 <= e <= 1``, for all contacts or by name; default 0, plastic.
     impact : str, optional
         What it is the ratio of.  ``"poisson"`` (default): of the impulses of expansion and
-        compression; several contacts go through both phases together ([GP]).  ``"newton"``: of
-        normal velocities, ``J_i v+ >= -e_i J_i v-`` with an impulse only where equality holds
-        ([Moreau]).  With either nothing gains energy: the expansion stops short of that.
-        ``"stronge"``: its square is that of the work of the normal force, for one contact in the
-        plane ([Stronge]); other impacts are Poisson's.  ``"newton unlimited"``: as published, with
-        the energy that friction can make it gain.  Without friction these differ only where
+        compression; several contacts go through both phases together ([GlockerPfeiffer]).
+        ``"newton"``: of normal velocities, ``J_i v+ >= -e_i J_i v-`` with an impulse only where
+        equality holds ([Moreau]).  With either nothing gains energy: the expansion stops short of
+        that.  ``"stronge"``: its square is that of the work of the normal force, for one contact in
+        the plane ([Stronge]); other impacts are Poisson's.  ``"newton unlimited"``: as published,
+        with the energy that friction can make it gain.  Without friction these differ only where
         contacts of different coefficients are struck at once.
     count : int, optional
         Number of bodies; default 1.
@@ -349,8 +349,9 @@ class System(MechanicalSystem, Printed):
         told = contacts, position, periods_of(self.manifold, position), float(speed)
         names = () if self.scene is None else self.scene.names
         ties = compiled_ties(self.ties, [(self.manifold, self.count)], names)
-        given = exit_at, float(limit), names, ties, self.impact
-        return IdenticalBodies(body, self.count, *told, *given)
+        return IdenticalBodies(
+            body, self.count, *told, exit_at, float(limit), names, ties, self.impact
+        )
 
     @cached_property
     def _of_hulls(self) -> tuple[list[Call], tuple[FrictionContact, ...], list[Call]]:

@@ -1,4 +1,4 @@
-"""Thin rods that turn and fly pass through nothing: oracles are straight flights, sampled finely."""
+"""Thin rods that turn and fly pass through nothing: oracles are straight flights, in samples."""
 
 import numpy as np
 import pytest
