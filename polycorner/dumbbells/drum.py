@@ -72,7 +72,7 @@ class DumbbellDrum(MechanicalSystem):
         Static and dynamic coefficients: of sliding on the drum, per ball; of rolling, the torque
         per ball radius and load; of dumbbells that touch.
     restitution : float
-        Newton's coefficient between dumbbells and with the bottom.
+        Coefficient of Poisson's law of impact between dumbbells and with the bottom.
     ball_mass : float
         In g.  It scales energies and forces and leaves motion as it is.
     floor : bool

@@ -61,7 +61,7 @@ class Tie(Checked):
         Generalised forces by coordinate, such as ``{"x1": f, "x2": -f}``, functions of
         coordinates, velocities and the time.
     restitution : float or mapping from str to float, optional
-        Newton's coefficient of limits, ``0 <= e <= 1``; default 0.
+        Coefficient of limits, ``0 <= e <= 1``, for the law of impact of the system; default 0.
     parameters : mapping from str to float, optional
         Values of further symbols in the formulas.
     collide : bool, optional
