@@ -3,7 +3,7 @@
 110 s are reported for the ten million points by the published sampler ([HC20]).  ``--points`` is
 their number, ``--clusters`` lists numbers of spheres, ``--floppy`` points of each of four chains,
 ``--wells`` steps of a plain chain with square wells of several widths, which floppy clusters of six
-spheres are compared with (none by default; 100000000 take half a minute of processor time for each width).
+spheres are compared with (none by default; for each width 1e8 take half a minute of a processor).
 """
 
 import argparse
