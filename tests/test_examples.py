@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from examples import (
     ex01_heading,
@@ -454,9 +455,14 @@ def test_rough_walls_of_a_silo_bear_a_part_of_the_weight(tmp_path):
     assert ex32_silo.draw(found, tmp_path / "silo.png").stat().st_size > 10_000
 
 
-def test_a_nested_pair_ends_where_its_multipliers_do(tmp_path):
+@pytest.fixture(scope="module")
+def nested_corner():
+    return ex36_nested_corner.main()
+
+
+def test_a_nested_pair_ends_where_its_multipliers_do(nested_corner, tmp_path):
     """Against closed forms: ``r + t = 2 r sqrt(1 - r^2/l^2)``, and the height of a triangle."""
-    found = ex36_nested_corner.main()
+    found = nested_corner
     r, length = ex36_nested_corner.BALL, ex36_nested_corner.LENGTH
     critical = 2 * r * np.sqrt(1 - r**2 / length**2) - r
     (limit,) = [e for e in found.equal.events if e.kind.name == "CORNER_LIMIT"]
@@ -494,3 +500,135 @@ def test_a_nested_pair_ends_where_its_multipliers_do(tmp_path):
     np.testing.assert_allclose(r + rod, 2 * r * np.sqrt(1 - r**2 / long**2), rtol=1e-9)
     for path in ex36_nested_corner.draw(found, tmp_path):
         assert path.stat().st_size > 10_000
+
+
+class ParallelPair:
+    """Two parallel dumbbells in a drum, each other's image in a half-turn about the vertical.
+
+    A is at the azimuth ``phi`` and B at ``-phi``, ``eta`` further along the drum; all from
+    positions in space.
+    """
+
+    LENGTH, BALL, ROD, RHO = 16.0, 3.0, 1.5, 122.0
+
+    def balls(self, phi, eta, theta):
+        turn = math.asin(self.LENGTH * math.sin(theta) / 2 / self.RHO)
+        reach = self.LENGTH / 2 * math.cos(theta)
+        return [
+            np.array([self.RHO * math.sin(a), y, -self.RHO * math.cos(a)])
+            for a, y in ((phi - turn, eta - reach), (phi + turn, eta + reach))
+        ]
+
+    def gap(self, contact, phi, theta, eta):
+        a, b = self.balls(phi, 0.0, theta), self.balls(-phi, eta, theta)
+        if contact == "balls":
+            return np.linalg.norm(a[1] - b[0]) - 2 * self.BALL
+        way = (b[1] - b[0]) / self.LENGTH
+        foot = b[0] + (a[1] - b[0]) @ way * way
+        return np.linalg.norm(a[1] - foot) - self.BALL - self.ROD
+
+    def height(self, contact, theta, eta):
+        """Return the height of the balls where a contact holds."""
+        phi = optimize.brentq(lambda x: self.gap(contact, x, theta, eta), 0, 0.04, xtol=1e-15)
+        balls = [*self.balls(phi, 0.0, theta), *self.balls(-phi, eta, theta)]
+        return sum(ball[2] for ball in balls)
+
+    def slopes(self, contact, theta, eta, h=1e-4):
+        """Return the derivatives of the height by ``theta`` and ``eta``."""
+        return [
+            (self.height(contact, theta + h * i, eta + h * j)
+             - self.height(contact, theta - h * i, eta - h * j)) / (2 * h)
+            for i, j in ((1, 0), (0, 1))
+        ]  # fmt: skip
+
+    def tilt(self, contact, eta_of, lever, sign):
+        """Return the tilt at which no other force acts, and the heading there.
+
+        Lever is what a turn of the pair lifts its weight along the drum by.
+        """
+
+        def turning(theta):
+            by_theta, by_eta = self.slopes(contact, theta, eta_of(theta))
+            return by_theta + lever * math.sin(theta) * by_eta
+
+        theta = optimize.brentq(turning, 0.08, 0.16)
+        return math.atan(sign * self.slopes(contact, theta, eta_of(theta))[1] / 2), theta
+
+    def corner(self, theta):
+        """Return ``eta`` where both kinds of contacts hold."""
+
+        def left(eta):
+            phi = optimize.brentq(lambda x: self.gap("rods", x, theta, eta), 0, 0.04, xtol=1e-15)
+            return self.gap("balls", phi, theta, eta)
+
+        return optimize.brentq(left, 11.5, 13.5, xtol=1e-13)
+
+
+def test_a_tilted_pair_ends_where_one_dumbbell_carries_the_other(nested_corner):
+    """Against a pair of three coordinates, from its definition, and closed forms in the plane."""
+    pair = ParallelPair()
+    length, rho, p = pair.LENGTH, pair.RHO, pair.BALL + pair.ROD
+    s = math.sqrt(4 * pair.BALL**2 - p**2)
+    flat = length - s
+    known = {}
+    for held, lever in (("lower", 0.0), ("end", length)):
+        opens, _ = pair.tilt("rods", pair.corner, lever, -1)
+        folds = optimize.minimize_scalar(
+            lambda eta, lever=lever: -pair.tilt("rods", lambda _: eta, lever, -1)[0],
+            bounds=(8.5, 12.0), method="bounded",
+        )  # fmt: skip
+        known[held] = {"OPENS": opens, "FOLD": -folds.fun}
+    known["upper"] = {"CORNER_LIMIT": pair.tilt("balls", pair.corner, 0.0, 1)[0]}
+    for (held, hand), found in nested_corner.tilts.items():
+        kinds = {e.kind.name: e for e in found.events if e.kind.name not in ("END", "UNDECIDED")}
+        told = {kind: event.parameter for kind, event in kinds.items()}
+        assert told == pytest.approx(known.get(held, {}), rel=1e-5)
+        (stable,) = [arc for arc in found.arcs if arc.stable and "A2B1" in arc.active]
+        assert {"A2B1", "A2b", "aB1"} <= {*stable.active}
+        mirrored = nested_corner.tilts[held, "L" if hand == "R" else "R"]
+        assert [e.parameter for e in mirrored.events] == pytest.approx(
+            [e.parameter for e in found.events], rel=1e-9
+        )
+        if held == "each":
+            assert np.ptp(stable.points, axis=0) == pytest.approx(0, abs=1e-9)
+            force = 4 * np.sin(stable.parameters)
+            np.testing.assert_allclose(stable.multipliers["support"], force, rtol=1e-9)
+            assert stable.parameters[-1] == pytest.approx(math.pi / 2)
+
+    def across(theta):
+        return p * math.cos(theta) - flat * math.sin(theta)
+
+    def turning(theta, pull):
+        along = flat * math.cos(theta) + p * math.sin(theta)
+        return -along * across(theta) + length**2 * math.sin(2 * theta) / 2 + pull * across(theta)
+
+    def pushed(theta):
+        return across(theta) * math.tan(theta)
+
+    def pulled(theta):
+        return across(theta) * (s - p * math.tan(theta)) / (p + s * math.tan(theta))
+
+    leans = optimize.brentq(lambda x: turning(x, pushed(x)), 0.1, 0.2)
+    hangs = optimize.brentq(lambda x: turning(x, -pulled(x)), 0.1, 0.2)
+    plane = {
+        "OPENS": (known["lower"], leans, pushed),
+        "CORNER_LIMIT": (known["upper"], hangs, pulled),
+    }
+    for kind, (drum, theta, force) in plane.items():
+        assert math.atan(force(theta) / (2 * rho)) == pytest.approx(drum[kind], rel=1e-3)
+
+    # The numbers of docs/paper.md
+    degrees = {
+        "lower": {"OPENS": 0.0908, "FOLD": 0.0965}, "upper": {"CORNER_LIMIT": 0.4014},
+        "end": {"OPENS": 0.0914, "FOLD": 0.0978},
+    }  # fmt: skip
+    for held, kinds in degrees.items():
+        found = {kind: math.degrees(value) for kind, value in known[held].items()}
+        assert found == pytest.approx(kinds, abs=5e-5)
+    shares = [math.tan(known["lower"]["OPENS"]), math.tan(known["upper"]["CORNER_LIMIT"])]
+    assert np.divide(shares, math.tan(math.radians(7))) == pytest.approx([0.013, 0.057], abs=5e-4)
+
+    slide = nested_corner.slide
+    assert slide.kind.name == "FOLD"
+    assert {*slide.after} == {"A1B1", "A2B2", "A2b", "aB1", "A1"}
+    assert slide.released > 0
