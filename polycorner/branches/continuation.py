@@ -32,6 +32,7 @@ class Stop(Enum):
     FAR = "it leaves the extent that was asked for"
     LOST = "no step is short enough"
     LONG = "it has taken the most steps"
+    LINE = "the parameter stays while the point moves: equilibria are not isolated there"
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,8 @@ class _Continuation(Stepper[P]):
 
         def value(s: float) -> tuple[float, P]:
             at = self._between(point, s)
-            return float(at.spectra()[i][k]), at
+            # Where gradients depend a direction less may be found to be free; it counts as stiff.
+            return float([*at.spectra()[i], *np.ones(k + 1)][k]), at
 
         return sign_change(value)
 
@@ -254,6 +256,8 @@ Found = tuple[float, FritzJohn, Stop | None]  # part of the way, a point, what i
 
 class _ArcContinuation(_Continuation[FritzJohn]):
     def _event(self, point: FritzJohn, t: Array) -> tuple[FritzJohn, Stop | None] | None:
+        if self._stays(point, t):
+            return self.point, Stop.LINE
         event = super()._event(point, t)
         if event is None or event[1] is not Stop.EVENT:
             return event
@@ -270,6 +274,13 @@ class _ArcContinuation(_Continuation[FritzJohn]):
         """Return where a curvature vanishes or the parameter turns back on the way to a point."""
         found = self._first_flat(point, t)
         return [] if found is None else [found]
+
+    def _stays(self, point: FritzJohn, t: Array) -> bool:
+        """Whether only the point moves on the way to another, far enough to tell from a fold."""
+        n, h = self.system.n, self.chord(point)
+        moved = float(np.linalg.norm(point.u - self.point.u))
+        change = max(abs(point.s - self.point.s) / h, abs(self.t[n]), abs(t[n]))
+        return bool(moved > self.system.tolerances.beside and change <= self.system.tolerances.zero)
 
     def _first_flat(self, point: FritzJohn, t: Array) -> Found | None:
         """Return where a curvature vanishes on the way to a point, or the parameter turns back.

@@ -25,7 +25,7 @@ class BranchKind(Enum):
 
     OPENS = "a contact opens and the equilibrium persists"
     CLOSES = "a contact closes and the equilibrium persists"
-    EXCHANGE = "one contact is exchanged for another and the equilibrium persists"
+    EXCHANGE = "contacts are exchanged for as many others and the equilibrium persists"
     CORNER_LIMIT = "two equilibria that differ by contacts meet there, and none is beyond"
     FOLD = "two equilibria of one face meet there, and none is beyond"
     BRANCH = "several curves of equilibria cross there"

@@ -41,7 +41,7 @@ from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
 
-@dataclass
+@dataclass(eq=False)
 class _Arm:
     """A direction in which a curve leaves a meeting, and its number once it was followed."""
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from polycorner.branches.continuation import corrected
 from polycorner.branches.diagram import BranchKind
-from polycorner.branches.events import Node, kind_of, weak_event
+from polycorner.branches.events import kind_of, weak_event
 from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
 from polycorner.spaces.manifold import Array
 
@@ -162,7 +162,7 @@ def kind_and_gain(at: EventPoint, tangent: Array) -> tuple[BranchKind, int | Non
     node = weak_event(sliced(at, normal))
     kind, gain, h = kind_of(node), 0, at.system.tolerances.beside
     for arm in node.arms:
-        here = arm_point(node, arm.face)
+        here = arm.start
         # Where gradients are dependent the parameter moves to second order only.
         ahead = corrected(here.moved(here.x + h * arm.direction), arm.direction, h)
         moved = 0.0 if ahead is None else ahead.s - here.s
@@ -180,9 +180,3 @@ def _of_corner(at: FritzJohn, direction: Array) -> BranchKind:
     left = np.full(len(mu), np.inf)
     np.divide(mu, -rates, out=left, where=rates < 0)
     return BranchKind.VANISHES if np.argmin(left) == len(mu) - 1 else BranchKind.EXCHANGE
-
-
-def arm_point(node: Node, face: Face) -> FritzJohn:
-    """Return the point of an event on a face that leaves it."""
-    system, at = node.at.system, node.at
-    return system.point(face, system.guess(face, at.u, at.both, at.mu))

@@ -9,6 +9,12 @@ from one arc to exactly one other ([KojimaHirabayashi] sec. 4): if the parameter
 equilibrium persists; if it turns back, this is a corner limit ([SchulzPellegrino]), at which the
 index of the two arcs differs by one.
 
+*Contacts are exchanged.*  Where gradients of functions that vanish depend, with the energy's
+multiplier positive, multipliers are not unique: they are a polytope.  At its vertices they are, on
+as many functions as the rank; if none of these multipliers is zero, the arcs that leave are those
+of the vertices' faces along which all other functions that vanish grow.  So several contacts that
+change at once, by symmetry, are exchanged.
+
 *A curvature along the face vanishes.*  If the curve is regular, the parameter turns back: a fold.
 Else this is a branch point (:mod:`polycorner.branches.branching`).
 
@@ -25,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner.branches.branching import branch_point, curves
-from polycorner.branches.continuation import Course, Stop
+from polycorner.branches.continuation import Course, Stop, corrected
 from polycorner.branches.diagram import BranchKind
 from polycorner.branches.system import Face, FritzJohn
 from polycorner.polyhedra.cones import null_space, unit_rows
@@ -38,11 +44,16 @@ TOLD = BranchKind.OPENS
 
 @dataclass
 class Arm:
-    """A direction in which an arc leaves an event, and its number once it was followed."""
+    """A direction in which an arc leaves an event from a point, and its number once followed."""
 
-    face: Face
+    start: FritzJohn
     direction: Array
     arc: int = -1
+
+    @property
+    def face(self) -> Face:
+        """The functions that are held along the arc."""
+        return self.start.face
 
 
 @dataclass
@@ -66,7 +77,7 @@ def event_at_end(way: Course[FritzJohn]) -> Node:
     at = way.last
     if way.stop is Stop.FAR:
         return Node(at, BranchKind.FAR)
-    if way.stop in {Stop.LOST, Stop.LONG}:
+    if way.stop in {Stop.LOST, Stop.LONG, Stop.LINE}:
         return Node(at, BranchKind.UNDECIDED, notes=[way.stop.value])
     if way.stop is Stop.EVENT:
         return weak_event(at)
@@ -96,9 +107,45 @@ def weak_event(at: FritzJohn, most: int = 10) -> Node:
         for sign in signs:
             x = system.guess(face, at.u, at.s, sign * at.mu)
             node.arms += _leaving(system.point(face, x), node, m + np.flatnonzero(vanish[m:]))
+    if node.notes and not vanish[m:].any() and not system.is_sparse:
+        return _exchange(node) or node
     if system.is_sparse and vanish[m]:
         node.notes.append("the energy's multiplier vanishes, in a sparse problem")
     return node
+
+
+def _exchange(node: Node) -> Node | None:
+    """Return the event where contacts are exchanged; None if it is none, or not decided."""
+    at, system = node.at, node.at.system
+    rank, same = system.tolerances.rank, system.tolerances.same
+    touching, gradients = sorted({*at.face, *node.weak}), at.known.gradients[:, : system.n]
+    held = unit_rows(gradients[[*touching, *system.equations]])
+    most = int((np.linalg.svd(held, compute_uv=False) > rank).sum()) - len(system.equations)
+    if most == len(touching):
+        return None
+    found = Node(at, TOLD)
+    for face in combinations(touching, most):
+        rows = [*face, *system.equations]
+        matrix = gradients[rows].T
+        if np.linalg.svd(unit_rows(matrix.T), compute_uv=False)[-1] <= rank:
+            continue
+        mu = np.zeros(system.problem.rows)
+        mu[rows], mu[-1] = np.linalg.lstsq(matrix, gradients[-1], rcond=None)[0], 1.0
+        mu /= np.linalg.norm(mu)
+        if (mu[[*face]] < -same).any():
+            continue
+        found.weak = tuple(i for i in touching if i not in face)
+        start = system.point(face, system.guess(face, at.u, at.s, mu))
+        if (mu[[*face]] <= same).any() or abs(start.left).max() > system.tolerances.zero:
+            return None
+        found.arms += _leaving(start, found, np.zeros(0, dtype=np.intp))
+    if found.notes or not found.arms:
+        return None
+    # The same from both sides.
+    always = set.intersection(*({*arm.face} for arm in found.arms))
+    found.weak = tuple(i for i in touching if i not in always)
+    found.at = found.arms[0].start
+    return found
 
 
 def _leaving(here: FritzJohn, node: Node, also: NDArray[np.intp]) -> Iterator[Arm]:
@@ -106,7 +153,8 @@ def _leaving(here: FritzJohn, node: Node, also: NDArray[np.intp]) -> Iterator[Ar
     system, m = here.system, here.system.problem.inequalities
     t = here.only_tangent()
     if t is None:
-        node.notes.append("several curves of one face cross where functions vanish")
+        several = "several curves of one face cross where functions vanish"
+        node.notes.append(Stop.LINE.value if _is_line(here) else several)
         return
     values, slopes = here.watched()
     weak = list(node.weak)
@@ -125,22 +173,35 @@ def _leaving(here: FritzJohn, node: Node, also: NDArray[np.intp]) -> Iterator[Ar
             system.problem.polyhedron, np.concatenate([away, np.zeros(system.others)]), least / 2
         )
         if pressed and pieces == [frozenset(here.face)]:
-            yield Arm(here.face, side * t)
+            yield Arm(here, side * t)
 
 
 def flat_event(at: FritzJohn, t: Array) -> Node:
     """Return the event where a curvature along the face vanishes, with the tangent of arrival."""
     if at.is_fold(t):
-        return Node(at, BranchKind.FOLD, arms=[Arm(at.face, at.tangent(t))])
+        return Node(at, BranchKind.FOLD, arms=[Arm(at, at.tangent(t))])
     found = None if at.system.is_sparse else branch_point(at)
     if found is None:
         note = "a curvature vanishes, but neither a fold nor a branch point was found"
+        note = Stop.LINE.value if _is_line(at) else note
         return Node(at, BranchKind.UNDECIDED, notes=[note])
     node = Node(found.at, BranchKind.BRANCH)
     tangents, note = curves(found)
-    node.notes += [note] if note else []
-    node.arms = [Arm(at.face, sign * v) for v in tangents for sign in (1.0, -1.0)]
+    if note:
+        node.notes.append(Stop.LINE.value if _is_line(found.at) else note)
+    node.arms = [Arm(found.at, sign * v) for v in tangents for sign in (1.0, -1.0)]
     return node
+
+
+def _is_line(at: FritzJohn) -> bool:
+    """Whether equilibria at the same value of the parameter are not isolated there."""
+    system, distance = at.system, at.system.tolerances.beside
+    if system.is_sparse:
+        return False
+    fixed = np.eye(len(at.x))[system.n : system.n + system.d]
+    along = np.linalg.svd(np.vstack([at.jacobian, fixed]))[2][-1]
+    found = corrected(at.moved(at.x + distance * along), fixed[0], distance)
+    return found is not None and bool(np.linalg.norm(found.u - at.u) > distance / 2)
 
 
 def kind_of(node: Node) -> BranchKind:

@@ -15,6 +15,7 @@ from polycorner.branches.events import (
     Arm,
     Node,
     event_at_end,
+    flat_event,
     kind_of,
     weak_event,
 )
@@ -46,6 +47,9 @@ class _BranchSearch:
     def begin(self, at: FritzJohn) -> None:
         """Follow the curve through an equilibrium both ways, as one arc."""
         if any(self._passes(edge, at) for edge in self.edges):
+            return
+        if at.only_tangent() is None:
+            self.nodes.append(flat_event(at, at.tangent()))
             return
         back, on = (self._follow(at, side * at.tangent()) for side in (-1.0, 1.0))
         if back.stop is Stop.CLOSED:
@@ -83,10 +87,7 @@ class _BranchSearch:
         return follow(at, direction, self.options, extent=self.extent)
 
     def _leave(self, k: int, arm: Arm) -> None:
-        at = self.nodes[k].at
-        sign = 1.0 if at.x[-1] >= 0 else -1.0
-        x = self.system.guess(arm.face, at.u, at.s, sign * at.mu)
-        way = self._follow(self.system.point(arm.face, x), arm.direction)
+        way = self._follow(arm.start, arm.direction)
         arm.arc = len(self.edges)
         self.edges.append(_Edge(arm.face, way.points, [k, -1]))
         self._arrive(way, arm.arc, 1)
@@ -112,7 +113,7 @@ class _BranchSearch:
             return
         if best is not None or node.kind is BranchKind.BRANCH:
             node.notes.append("an arc arrives along a curve that is not known to leave")
-        node.arms.append(Arm(face, back, edge))
+        node.arms.append(Arm(way.last, back, edge))
 
     def _known(self, node: Node) -> int | None:
         near = self.system.tolerances.corner
