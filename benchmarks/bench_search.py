@@ -15,9 +15,8 @@ from side_by_side import interleave, print_table, write
 
 from polycorner import minimise
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.statics.minima_map import (
+from polycorner.dumbbells.statics.pair_minima import (
     energy_symmetry,
-    minima_map,
     pair_minima,
     scattered,
 )
@@ -71,7 +70,6 @@ def main() -> None:
     print_table(f"Descents that end in a minimum, of {PART}", ["", ""], list(right.items()))
     print(f"\n{found}")
     board_minima = minima(board.polyhedron, board.energy, starts=places)
-    coarse = minima_map(starts=50)
     print(f"\nPinball: {board_minima.completeness}")
     write(
         "search",
@@ -80,7 +78,6 @@ def main() -> None:
             "seconds": seconds,
             f"right of {PART}": right,
             "minima": {"pair": len(found), "pinball": len(board_minima)},
-            "kinds on the map, 50 starts for each pair": list(coarse.kinds),
         },
     )
 

@@ -22,6 +22,7 @@ from polycorner.dumbbells import (
     RelativePlacements,
     dyad_minima,
     meeting_basins,
+    minima_map,
     pair_atlas,
     pair_map,
 )
@@ -32,7 +33,9 @@ from polycorner.dumbbells.dynamics.pairs import DumbbellLengths
 from polycorner.dumbbells.pictures import (
     draw_atlas,
     draw_heading,
+    draw_kinds,
     draw_meetings,
+    draw_minima_map,
     draw_pair,
     draw_pair_map,
     draw_relative,
@@ -79,6 +82,13 @@ def proportions() -> None:
     """Draw the map over length and rod radius."""
     found = pair_map(np.linspace(2, 6, 12), np.linspace(0.05, 0.95, 8), tolerance=1e-3)
     save(draw_pair_map(found), _png("pair_map"))
+
+
+def minima_kinds() -> None:
+    """Draw the regions with the same minima over the proportions, and an example of each kind."""
+    found = minima_map()
+    save(draw_minima_map(found), _png("minima_map"))
+    save(draw_kinds(found), _png("minima_kinds"))
 
 
 def collisions() -> None:
@@ -262,6 +272,7 @@ DRAWN = {
         delta,
         atlas,
         proportions,
+        minima_kinds,
         collisions,
         dyad_landscape,
         tutorial,

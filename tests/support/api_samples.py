@@ -126,7 +126,7 @@ run = cache(lambda: pc.simulate(drum(), drum().state(PLACED), 0.01, 0.001))
 film = cache(lambda: drum_pictures.pair_film(pair(), [pair().nested("R")] * 2))
 scene = cache(lambda: drum_pictures.pair_scene(pair(), pair().nested("R")))
 minima_map = cache(
-    lambda: dumbbells.minima_map(curvatures=[0.5], rods=[0.5], lengths=[4.0, 6.0], starts=3)
+    lambda: dumbbells.minima_map(curvatures=[0.5], rods=[0.4, 0.5], lengths=[4.0, 6.0], starts=3)
 )
 pair_map = cache(lambda: dumbbells.pair_map([4.0], [0.5]))
 spheres = cache(lambda: models.SphereCluster(4))

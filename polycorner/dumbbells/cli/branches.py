@@ -69,7 +69,7 @@ def dyad(
         import numpy as np
 
         from polycorner.dumbbells.statics.minima import dyad_corner
-        from polycorner.dumbbells.statics.minima_map import energy_symmetry
+        from polycorner.dumbbells.statics.pair_minima import energy_symmetry
 
         corner, symmetry = dyad_corner(pair, "R").certificate, energy_symmetry(pair)
         varied = corner.problem.parameter_values.keys() & RATES[name].keys()

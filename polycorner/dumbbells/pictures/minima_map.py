@@ -10,37 +10,36 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Polygon
 
+from polycorner.branches import BranchKind
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.bodies import rod_outlines
-from polycorner.dumbbells.statics.minima_map import MinimaMap, crossing_clearance
-from polycorner.dumbbells.statics.skeleton import long_rod_length
+from polycorner.dumbbells.statics.minima_map import MinimaMap, MinimaSheet
+from polycorner.dumbbells.statics.regions import Plane, deepest, filled
 from polycorner.minimisation import Certificate
 from polycorner.toolkit import BODIES, Array, checked
 
 UNSEEN, NONE = "0.75", "white"
 NESTED = {"staggered": "#E69F00", "delta": "#56B4E9"}
 MARKS = ("x", "+", "1", "2", "3", "4", "|", "_", "*", "P", "^", "v", "<", ">", "s", "D")
-ASIDE = 0.14  # distance of marks within a cell, in logarithms of the length
-FINE = 90  # points of a closed-form curve along either axis
+ASIDE = 0.16  # distance of marks, in logarithms of the length
+TICKS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 2.2, 3, 4, 6, 8, 12, 16, 24)
 COLUMNS = 4
 
 
 @checked
 def draw_minima_map(found: MinimaMap) -> Figure:
-    """Draw, for every ``l/R``, the kinds of minima found over ``l/r`` and ``t/r``.
+    """Draw, for every ``l/R``, the regions with the same minima over ``l/r`` and ``t/r``.
 
-    The colour of a cell is the nested kind found there; marks are further kinds beside ``G``.
-    Lines are closed forms: full, the length above which a ball reaches the other's rod; dashed,
-    the boundary of the region in which a level crossing fits.
+    The colour of a region is its nested kind; marks are further kinds beside ``G``.  Borders are
+    drawn by what happens there, dashed where what is beyond was not followed but listed.
     """
-    panels = len(found.curvatures)
+    panels = max(len(found.sheets), 1)
     columns = min(2, panels)
     rows = math.ceil(panels / columns)
     figure = Figure(figsize=(5.2 * columns, 4.1 * rows + 1.2), layout="constrained")
-    for i in range(panels):
-        axes = figure.add_subplot(rows, columns, i + 1)
-        _draw_panel(axes, found, i)
-    figure.suptitle(f"Kinds of minima of a pair beside G, {found.starts} starts for each pair")
+    for i, sheet in enumerate(found.sheets):
+        _draw_sheet(figure.add_subplot(rows, columns, i + 1), found, sheet)
+    figure.suptitle("Kinds of minima of a pair beside G, and their numbers where there are several")
     figure.legend(handles=_handles(found), loc="outside lower center", ncols=4, frameon=False)
     return figure
 
@@ -65,64 +64,51 @@ def draw_kinds(found: MinimaMap) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, found: MinimaMap, i: int) -> None:
-    colours, layer = [UNSEEN, NONE], np.where(found.examined[i], 1, 0)
-    for kind, colour in NESTED.items():
-        colours.append(colour)
-        layer[found.has(kind)[i]] = len(colours) - 1
+def _draw_sheet(axes: Axes, found: MinimaMap, sheet: MinimaSheet) -> None:
+    axes.set_facecolor(UNSEEN)
+    if sheet.within is not None:
+        sides = sheet.within.rods, sheet.within.lengths
+        _draw_regions(axes, found, sheet, Plane(sides, len(sheet.labels)))
+    for border in sheet.borders:
+        style = "dashed" if border.kind is BranchKind.UNDECIDED else "solid"
+        axes.plot(*border.parameters[:, ::-1].T, color="black", lw=1.2, ls=style)
+    axes.set(xscale="log", yscale="log", xlabel="l/r", ylabel="t/r")
+    axes.set(xlim=found.lengths, ylim=found.rods)
+    for axis, ends in ((axes.xaxis, found.lengths), (axes.yaxis, found.rods)):
+        ticks = [x for x in TICKS if ends[0] <= x <= ends[1]]
+        axis.set_ticks(ticks, [f"{x:g}" for x in ticks])
+        axis.set_ticks([], minor=True)
+    axes.set_title(f"l/R = {sheet.curvature:g}" if sheet.curvature else "plane")
+
+
+def _draw_regions(axes: Axes, found: MinimaMap, sheet: MinimaSheet, plane: Plane) -> None:
+    colours, layer = [NONE, *NESTED.values()], np.zeros_like(sheet.labels)
+    for k, region in enumerate(sheet.regions):
+        nested = [i for i, kind in enumerate(NESTED, 1) if kind in region.kinds]
+        layer[filled(sheet.labels) == k] = nested[-1] if nested else 0
+        others = [(mark, region.kinds.get(kind, 0)) for kind, mark in _marks(found).items()]
+        _mark(axes, plane.at(deepest(sheet.labels == k)), [one for one in others if one[1]])
     axes.pcolormesh(
-        _edges(found.lengths),
-        _edges(found.rods),
+        *plane.axes[::-1],
         layer,
+        shading="nearest",
         cmap=ListedColormap(colours),
         vmin=-0.5,
         vmax=len(colours) - 0.5,
-        edgecolor="0.85",
-        linewidth=0.5,
+        rasterized=True,
     )
-    marks = _marks(found)
-    shown = np.array([found.has(kind)[i] for kind in marks]).reshape(len(marks), *layer.shape)
-    places = shown.cumsum(axis=0) - 1 - (shown.sum(axis=0) - 1) / 2
-    for mark, there, place in zip(marks.values(), shown, places, strict=True):
-        j, k = np.nonzero(there)
-        aside = found.lengths[k] * np.exp(ASIDE * place[j, k])
-        axes.plot(aside, found.rods[j], mark, color="black", markersize=9)
-    _draw_curves(axes, found, float(found.curvatures[i]))
-    axes.set(xscale="log", yscale="log", xlabel="l/r", ylabel="t/r")
-    for axis, ticks in ((axes.xaxis, found.lengths), (axes.yaxis, found.rods)):
-        axis.set_ticks(ticks, [f"{x:g}" for x in ticks])
-        axis.set_ticks([], minor=True)
-    curvature = found.curvatures[i]
-    axes.set_title(f"l/R = {curvature:g}" if curvature else "plane")
 
 
-def _draw_curves(axes: Axes, found: MinimaMap, curvature: float) -> None:
-    across, up = _edges(found.lengths), _edges(found.rods)
-    rods = np.geomspace(up[0], min(up[-1], 0.999), FINE)
-    lengths = np.geomspace(across[0], across[-1], FINE)
-    axes.plot([long_rod_length(1.0, t) for t in rods.tolist()], rods, color="black", lw=1.5)
-    axes.set(xlim=(across[0], across[-1]), ylim=(up[0], up[-1]))
-    if curvature:
-        rows = [[_room(length, t, curvature) for length in lengths.tolist()] for t in rods.tolist()]
-        room = np.array(rows)
-        if (room > 0).any():
-            axes.contour(lengths, rods, room, levels=[0.0], colors="black", linestyles="dashed")
-
-
-def _room(length: float, rod: float, curvature: float) -> float:
-    drum = length / curvature
-    if length < 2 or length >= 2 * (drum - 1):
-        return math.nan
-    return crossing_clearance(DumbbellPair(length, 1.0, rod, drum))
-
-
-def _edges(values: Array) -> Array:
-    """Return boundaries of cells around values, halfway between them in logarithms."""
-    logs = np.log(values)
-    middles = (logs[1:] + logs[:-1]) / 2
-    step = np.diff(logs) if len(logs) > 1 else np.array([0.5])
-    ends = logs[0] - step[0] / 2, logs[-1] + step[-1] / 2
-    return np.asarray(np.exp(np.concatenate([ends[:1], middles, ends[1:]])))
+def _mark(axes: Axes, place: tuple[float, float], marks: list[tuple[str, int]]) -> None:
+    """Draw marks side by side, with the number of minima where it is not one."""
+    rod, length = place
+    for k, (mark, count) in enumerate(marks):
+        at = length * math.exp(ASIDE * (k - (len(marks) - 1) / 2))
+        axes.plot(at, rod, mark, color="black", markersize=8)
+        if count > 1:
+            axes.annotate(
+                f"{count}", (at, rod), xytext=(3, 4), textcoords="offset points", fontsize=7
+            )
 
 
 def _marks(found: MinimaMap) -> dict[str, str]:
@@ -135,8 +121,8 @@ def _handles(found: MinimaMap) -> list[Patch | Line2D]:
         Patch(facecolor=NONE, edgecolor="0.6", label="none nested"),
         *[Patch(facecolor=colour, label=kind) for kind, colour in NESTED.items()],
         Patch(facecolor=UNSEEN, label="does not fit"),
-        Line2D([], [], color="black", label="long rods"),
-        Line2D([], [], color="black", linestyle="dashed", label="level crossing fits"),
+        Line2D([], [], color="black", label="followed on both sides"),
+        Line2D([], [], color="black", ls="dashed", label="listed on one side"),
     ]
     for kind, mark in _marks(found).items():
         handles.append(Line2D([], [], marker=mark, color="black", linestyle="", label=kind))

@@ -1,4 +1,4 @@
-"""All minima of a pair of dumbbells, and their dependence on its proportions.
+"""All minima of a pair of dumbbells.
 
 A kind of minimum is named by its contacts with positive multipliers:
 
@@ -14,23 +14,14 @@ others         the numbers of ball-ball, ball-rod and rod-rod contacts, ``crosse
 
 import math
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from polycorner.dumbbells.pair import LONGEST, DumbbellPair
+from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.symmetries import half_turn_in_place, relabellings
-from polycorner.minimisation import Certificate, Minima, certify, minima
+from polycorner.minimisation import Certificate, Minima, minima
 from polycorner.polyhedra import Element, Symmetry
-from polycorner.toolkit import Array, Checked, Progress, checked, checks, silent
-
-CURVATURES = (0.128, 0.5, 1.0, 1.5)
-RODS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9)
-LENGTHS = (2.2, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
-FITTING = 0.995  # largest chord of the cylinder of ball centres that a dumbbell may be
+from polycorner.toolkit import Array, Progress, checked, checks, silent
 
 NAMES = {(0, 0, 0): "G", (1, 2, 0): "delta", (3, 0, 0): "staggered", (0, 0, 1): "crossed"}
 
@@ -170,160 +161,3 @@ def crossing_clearance(pair: DumbbellPair) -> float:
     arm = max(half - short - apart, 0.0) * width / half
     off = math.hypot(arm, 2 * t) - r - t
     return min(half - width, max(short - apart, off))
-
-
-@dataclass(frozen=True, eq=False)
-class MinimaMap(Checked):
-    """Kinds of minima found from random starts, over the proportions of a pair.
-
-    Attributes
-    ----------
-    curvatures, rods, lengths : (k,), (n,) and (m,) arrays
-        ``l/R`` (0 is the plane), ``t/r`` and ``l/r``.
-    kinds : tuple of str
-        All kinds found.
-    counts : (k, n, m, kinds) array of int
-        Number of starts that ended in each kind; -1 for a pair that does not fit in its drum or
-        was not reached.
-    distinct : (k, n, m, kinds) array of int
-        Number of minima of that kind, mirror images and relabelled ones counted once.
-    lost : (k, n, m) array of int
-        Number of starts that ended in no minimum.
-    starts : int
-        Number of starts for each pair.
-    examples : mapping from str to (DumbbellPair, Certificate)
-        For each kind the pair in which most starts ended in it, with the dumbbells close together.
-    """
-
-    curvatures: Array
-    rods: Array
-    lengths: Array
-    kinds: tuple[str, ...]
-    counts: NDArray[np.int64]
-    distinct: NDArray[np.int64]
-    lost: NDArray[np.int64]
-    starts: int
-    examples: Mapping[str, tuple[DumbbellPair, Certificate]]
-
-    @checked
-    def has(self, kind: str) -> NDArray[np.bool_]:
-        """Whether a kind was found, ``(k, n, m)``."""
-        if kind not in self.kinds:
-            return np.zeros(self.lost.shape, dtype=bool)
-        return np.asarray(self.counts[..., self.kinds.index(kind)] > 0)
-
-    @property
-    def examined(self) -> NDArray[np.bool_]:
-        """Whether a pair fits in its drum and was examined, ``(k, n, m)``."""
-        return np.asarray(self.lost >= 0)
-
-    @checked
-    def pair(self, i: int, j: int, k: int) -> DumbbellPair | None:
-        """Return a pair of the grid, in ball radii; None if it does not fit in its drum."""
-        return _pair(*(float(x) for x in (self.curvatures[i], self.rods[j], self.lengths[k])))
-
-
-@checked
-def minima_map(
-    *,
-    curvatures: ArrayLike = CURVATURES,
-    rods: ArrayLike = RODS,
-    lengths: ArrayLike = LENGTHS,
-    starts: int = 600,
-    rng: np.random.Generator | int | None = None,
-    progress: Progress = silent,
-) -> MinimaMap:
-    """Map the kinds of minima over ``l/R``, ``t/r`` and ``l/r``.
-
-    Mirror images count as one.  The share of starts that end in a kind depends on the
-    distribution of :func:`scattered`; a kind that is not found may be rare instead of absent.
-
-    Parameters
-    ----------
-    curvatures : (k,) array, optional
-        ``l/R``, increasing, at least 0 (the plane) and below 2.
-    rods : (n,) array, optional
-        ``t/r``, increasing and strictly between 0 and 1.
-    lengths : (m,) array, optional
-        ``l/r``, increasing, at least 2 and below 1e8.
-    starts : int, optional
-        Number of starts for each pair.
-    rng : Generator or int, optional
-        Source of the starts; default a generator with seed 0.
-    progress : callable, optional
-        Called as ``progress(done, pairs, note)`` after every pair.
-
-    Returns
-    -------
-    MinimaMap
-        Also after an interruption (Ctrl-C), without the pairs that were not reached.
-
-    Raises
-    ------
-    TypeError, ValueError
-        For arguments of a wrong kind, shape or range.
-    """
-    axes = (
-        checks.increasing("curvatures", curvatures, least=0, below=2),
-        checks.increasing("rods", rods, above=0, below=1),
-        checks.increasing("lengths", lengths, least=2, below=LONGEST),
-    )
-    generator = checks.generator("rng", rng)
-    survey = _Survey(tuple(len(axis) for axis in axes), starts)
-    cells = list(product(*(range(len(axis)) for axis in axes)))
-    try:
-        for done, cell in enumerate(cells, 1):
-            pair = _pair(*(float(axis[k]) for axis, k in zip(axes, cell, strict=True)))
-            if pair is not None:
-                survey.put(cell, pair, pair_minima(pair, starts=starts, rng=generator, mirror=True))
-            progress(done, len(cells), "pairs")
-    except KeyboardInterrupt:
-        pass  # the pairs that were reached are the answer
-    return survey.result(*axes)
-
-
-class _Survey:
-    """Results found so far."""
-
-    def __init__(self, shape: tuple[int, ...], starts: int) -> None:
-        self.starts = starts
-        self.lost = np.full(shape, -1, dtype=np.int64)
-        self.counts: dict[str, NDArray[np.int64]] = {}
-        self.distinct: dict[str, NDArray[np.int64]] = {}
-        self.examples: dict[str, tuple[int, DumbbellPair, Certificate]] = {}
-
-    def put(self, cell: tuple[int, ...], pair: DumbbellPair, found: Minima) -> None:
-        """Record the minima of one pair; an unfinished search does not count."""
-        if found.interrupted:
-            raise KeyboardInterrupt
-        self.lost[cell] = sum(found.elsewhere.values())
-        for certificate, count, points in zip(found, found.counts, found.points, strict=True):
-            kind = kind_of(certificate)
-            for table, more in ((self.counts, count), (self.distinct, 1)):
-                table.setdefault(kind, np.zeros(self.lost.shape, dtype=np.int64))[cell] += more
-            if count > self.examples.get(kind, (0,))[0]:
-                closest = min(points, key=lambda q: abs(q[4] - q[1]))
-                example = certify(pair.polyhedron, pair.energy, closest)
-                self.examples[kind] = (count, pair, example)
-
-    def result(self, curvatures: Array, rods: Array, lengths: Array) -> MinimaMap:
-        """Return the map; kinds in the order of the number of starts that ended in them."""
-        kinds = tuple(sorted(self.counts, key=lambda kind: -int(self.counts[kind].sum())))
-        counts, distinct = (
-            np.array([np.where(self.lost < 0, -1, table[kind]) for kind in kinds], dtype=np.int64)
-            .reshape(len(kinds), *self.lost.shape)
-            .transpose(1, 2, 3, 0)
-            for table in (self.counts, self.distinct)
-        )
-        examples = {kind: self.examples[kind][1:] for kind in kinds}
-        return MinimaMap(
-            curvatures, rods, lengths, kinds, counts, distinct, self.lost, self.starts, examples
-        )
-
-
-def _pair(curvature: float, rod: float, length: float) -> DumbbellPair | None:
-    """Return the pair with given ``l/R``, ``t/r`` and ``l/r`` in ball radii, if it fits."""
-    drum = math.inf if curvature == 0 else length / curvature
-    if drum <= 1 or length > FITTING * 2 * (drum - 1):
-        return None
-    return DumbbellPair(length, 1.0, rod, drum)

@@ -12,39 +12,42 @@ from polycorner.pictures.style import BODIES, save
 
 @pytest.fixture(scope="module")
 def found():
-    return minima_map(curvatures=[0, 1.5], rods=[0.1, 0.5], lengths=[3, 8, 16], starts=60)
+    given = {"rods": [0.35, 0.6], "lengths": [5, 8], "starts": 60}
+    return minima_map(curvatures=[0, 1, 1.95], **given)
 
 
-def test_every_mark_lies_in_a_cell_where_its_kind_was_found(found):
-    figure = draw_minima_map(found)
+def test_marks_lie_in_regions_of_their_kind(found):
     others = [kind for kind in found.kinds if kind != "G" and kind not in NESTED]
     assert "crossed" in others
-    for i, axes in enumerate(figure.axes):
+    for sheet, axes in zip(found.sheets, draw_minima_map(found).axes, strict=True):
         drawn = dict.fromkeys(others, 0)
         for line in axes.lines:
-            if line.get_marker() not in MARKS:
-                continue
-            kind = others[MARKS.index(line.get_marker())]
-            for x, y in line.get_xydata():
-                k, j = (
-                    int(abs(np.log(a / b)).argmin())
-                    for a, b in ((found.lengths, x), (found.rods, y))
-                )
-                assert found.has(kind)[i, j, k]
-                drawn[kind] += 1
-        assert drawn == {kind: found.has(kind)[i].sum() for kind in others}
+            if line.get_marker() in MARKS:
+                kind = others[MARKS.index(line.get_marker())]
+                ((length, rod),) = line.get_xydata()
+                drawn[kind] += kind in sheet.region(rod, length).kinds
+        assert drawn == {k: sum(k in r.kinds for r in sheet.regions) for k in others}
+
+
+def test_borders_are_drawn_where_they_are(found):
+    for sheet, axes in zip(found.sheets, draw_minima_map(found).axes, strict=True):
+        lines = [line.get_xydata() for line in axes.lines if line.get_marker() == "None"]
+        assert len(lines) == len(sheet.borders)
+        for line, border in zip(lines, sheet.borders, strict=True):
+            np.testing.assert_array_equal(line, border.parameters[:, ::-1])
 
 
 def test_colours_tell_what_nests(found):
-    figure = draw_minima_map(found)
-    for i, axes in enumerate(figure.axes):
-        mesh = axes.collections[0]
-        colours = mesh.cmap(mesh.norm(mesh.get_array())).reshape(2, 3, 4)[..., :3]
+    for sheet, axes in zip(found.sheets, draw_minima_map(found).axes, strict=True):
+        if sheet.within is None:
+            assert not axes.collections
+            continue
+        (mesh,) = axes.collections
+        colours = mesh.cmap(mesh.norm(mesh.get_array())).reshape(*sheet.labels.shape, 4)[..., :3]
         for kind, colour in NESTED.items():
             same = (abs(colours - to_rgb(colour)) < 1e-6).all(axis=-1)
-            np.testing.assert_array_equal(same, found.has(kind)[i])
-        grey = (abs(colours - to_rgb("0.75")) < 1e-6).all(axis=-1)
-        np.testing.assert_array_equal(grey, ~found.examined[i])
+            there = [k for k, region in enumerate(sheet.regions) if kind in region.kinds]
+            np.testing.assert_array_equal(same, np.isin(sheet.labels, there))
 
 
 def test_the_legend_names_every_kind_that_was_found_beside_g(found):
@@ -81,8 +84,7 @@ def test_the_upper_rod_of_a_crossing_is_drawn_last(found):
 
 
 def test_a_map_without_a_pair_that_fits_is_grey_throughout(tmp_path):
-    empty = minima_map(curvatures=[1.9], rods=[0.5], lengths=[3], starts=5)
-    assert not empty.examined.any()
+    empty = minima_map(curvatures=[1.95], rods=[0.5, 0.6], lengths=[3, 4], starts=5)
     assert not empty.kinds
     for k, draw in enumerate((draw_minima_map, draw_kinds)):
         path = save(draw(empty), tmp_path / f"{k}.png")

@@ -9,7 +9,8 @@ from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.statics.critical import critical_corner, plane_critical_formula
 from polycorner.dumbbells.statics.error_bars import heading_error_bar
 from polycorner.dumbbells.statics.keel import Keel, RestRegion, rests
-from polycorner.dumbbells.statics.minima_map import minima_map, pair_minima
+from polycorner.dumbbells.statics.minima_map import minima_map
+from polycorner.dumbbells.statics.pair_minima import pair_minima
 from polycorner.dumbbells.statics.skeleton_map import pair_map
 from polycorner.dumbbells.statics.wells import dyad_holds
 
@@ -17,7 +18,7 @@ PAIR = DumbbellPair(length=16, ball_radius=3, rod_radius=1.5, drum_radius=125)
 PLANE = replace(PAIR, drum_radius=math.inf)
 THICK = replace(PAIR, rod_radius=2.95)
 REGION = RestRegion(0.1, 0.1, 0.3)
-GRID = {"curvatures": [0.5], "rods": [0.2], "lengths": [4.0]}
+GRID = {"curvatures": [0.5], "rods": [0.2, 0.3], "lengths": [4.0, 5.0]}
 
 CALLS = [
     (critical_corner, (PAIR, "t"), {}, ValueError, "parameter"),
@@ -39,8 +40,9 @@ CALLS = [
     (dyad_holds, (PAIR, "X"), {}, ValueError, "chirality"),
     (minima_map, (), GRID | {"curvatures": [-0.1]}, ValueError, "curvatures"),
     (minima_map, (), GRID | {"rods": [0.5, 0.2]}, ValueError, "rods"),
-    (minima_map, (), GRID | {"rods": [math.nan]}, ValueError, "rods"),
-    (minima_map, (), GRID | {"lengths": [1.5]}, ValueError, "lengths"),
+    (minima_map, (), GRID | {"rods": [math.nan, 0.5]}, ValueError, "rods"),
+    (minima_map, (), GRID | {"rods": [0.1, 0.2, 0.5]}, ValueError, "rods"),
+    (minima_map, (), GRID | {"lengths": [1.5, 3.0]}, ValueError, "lengths"),
     (minima_map, (), GRID | {"lengths": []}, ValueError, "lengths"),
     (minima_map, (), GRID | {"starts": 0}, ValueError, "starts"),
     (pair_minima, (PAIR,), {"starts": 0}, ValueError, "starts"),

@@ -9,14 +9,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import placed_pairs
 
-from polycorner import Verdict, minimise
-from polycorner.branches import branches, event_curves
+from polycorner import Verdict
 from polycorner.dumbbells import DumbbellPair, dyad_minima
-from polycorner.dumbbells.statics.minima_map import (
+from polycorner.dumbbells.statics.pair_minima import (
     crossing_clearance,
     energy_symmetry,
     kind_of,
-    minima_map,
     pair_minima,
     scattered,
 )
@@ -210,69 +208,3 @@ def test_what_nests_changes_where_a_ball_begins_to_reach_the_other_rod(rod):
     for length, kind in ((limit - 0.1, "staggered"), (limit + 0.1, "delta")):
         found = pair_minima(DumbbellPair(length, 1.0, rod, 20), starts=300, mirror=True)
         assert kinds(found) == ["G", kind]
-
-
-# ------------------------------------------------------------------------------------ the map
-
-SMALL = {"curvatures": [0.5, 1.5], "rods": [0.05, 0.5], "lengths": [3, 16], "starts": 60}
-
-
-def test_the_map_counts_every_start_of_every_pair():
-    told = []
-    found = minima_map(**SMALL, progress=lambda done, pairs, _: told.append((done, pairs)))
-    assert told == [(k, 8) for k in range(1, 9)]
-    assert found.kinds[0] in ("G", "delta")
-    assert set(found.kinds) >= {"G", "delta", "staggered", "crossed"}
-    fits = np.array([[True, True], [False, True]])[:, None, :] & np.ones((2, 2, 2), dtype=bool)
-    np.testing.assert_array_equal(found.examined, fits)
-    total = found.counts.sum(axis=-1) + found.lost
-    assert (total[fits] == 60).all()
-    assert (found.counts[~fits] == -1).all()
-    assert ((found.counts > 0) == (found.distinct > 0)).all()
-    assert found.has("G")[fits].all()
-    assert not found.has("nothing of the kind").any()
-    for cell in np.argwhere(found.has("crossed")):
-        assert crossing_clearance(found.pair(*cell)) > 0
-    assert found.pair(1, 0, 0) is None
-    for kind, (pair, certificate) in found.examples.items():
-        assert kind_of(certificate) == kind
-        assert certificate.holds()
-        assert pair.ball_radius == 1
-
-
-def test_a_map_can_be_repeated_and_interrupted():
-    def stop(done, pairs, _note):
-        if done == 3 < pairs:
-            raise KeyboardInterrupt
-
-    whole, cut = minima_map(**SMALL), minima_map(**SMALL, progress=stop)
-    assert cut.examined.sum() == 3
-    for kind in cut.kinds:
-        one, two = (f.counts[..., f.kinds.index(kind)][cut.examined] for f in (whole, cut))
-        np.testing.assert_array_equal(one, two)
-
-
-def test_nested_kinds_change_on_curves_of_events():
-    """The curves are followed at one ``l/R``, for balls of radius 1; minima are sampled."""
-    curvature, rods, lengths = 0.5, [0.1, 0.5, 0.9], [2.5, 3.0, 4.5]
-    starts = []
-    for rod in (0.1, 0.7):
-        pair = DumbbellPair(3.0, 1.0, rod, 3.0 / curvature)
-        starts.append(minimise(pair.polyhedron, pair.energy, pair.nested("R")))
-    symmetry = energy_symmetry(pair)
-    change = {"l": 1.0, "R": 1 / curvature, "rho": 1 / curvature}
-    over_rods = branches(starts, "t", (0.02, 0.99), symmetry=symmetry)
-    found = event_curves(over_rods, change, (-0.8, 2.0), symmetry=symmetry)
-    borders = {}
-    for curve in found.curves:
-        rod, longer = curve.parameters[np.argsort(curve.parameters[:, 1])].T
-        limit = curve.kind.name == "CORNER_LIMIT"
-        borders.setdefault(limit, []).append(np.interp(np.array(lengths) - 3.0, longer, rod))
-    # Where a ball reaches a rod, from both sides, up to the interpolation.
-    np.testing.assert_allclose(*borders[False], rtol=1e-3)
-    (ends,) = borders[True]
-    sampled = minima_map(curvatures=[curvature], rods=rods, lengths=lengths, starts=100)
-    for k, reached in enumerate(borders[False][0]):
-        for j, rod in enumerate(rods):
-            assert sampled.has("staggered")[0, j, k] == (rod < reached)
-            assert sampled.has("delta")[0, j, k] == (reached < rod < ends[k])
