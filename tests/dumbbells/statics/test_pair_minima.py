@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from crossings import crossing_clearance
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import placed_pairs
@@ -12,7 +13,6 @@ from strategies import placed_pairs
 from polycorner import Verdict
 from polycorner.dumbbells import DumbbellPair, dyad_minima
 from polycorner.dumbbells.statics.pair_minima import (
-    crossing_clearance,
     energy_symmetry,
     kind_of,
     pair_minima,
