@@ -60,7 +60,7 @@ class _Resolution:
 
     nodes: int = 161
     least: int = 12
-    shortest: int = 3
+    shortest: int = 6
     alike: float = 0.5
     first: tuple[float, ...] = (0.1, 0.37, 0.63, 0.9)
     tries: int = 3
@@ -191,7 +191,7 @@ def minima_map(
     curvatures: ArrayLike = CURVATURES,
     rods: ArrayLike = RODS,
     lengths: ArrayLike = LENGTHS,
-    starts: int = 400,
+    starts: int = 250,
     rng: np.random.Generator | int | None = None,
     progress: Progress = silent,
 ) -> MinimaMap:

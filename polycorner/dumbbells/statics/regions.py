@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import Akima1DInterpolator
 
 from polycorner.toolkit import Array, Checked, cached_property
 
@@ -53,7 +53,7 @@ class Plane(Checked):
         along = np.concatenate([[0.0], np.cumsum(steps)])[kept]
         count = max(int(along[-1] / fine), 1) + 1
         at = np.union1d(along, np.linspace(0, along[-1], count))
-        return np.asarray(CubicSpline(along, line[kept])(at))
+        return np.asarray(Akima1DInterpolator(along, line[kept], method="makima")(at))
 
     def labels(self, lines: Sequence[Array]) -> NDArray[np.int64]:
         """Return the number of the region of each node, ``(nodes, nodes)``."""

@@ -202,6 +202,11 @@ def test_a_pair_with_no_room_to_cross_level_does_not():
     assert kinds(pair_minima(pair, starts=300, mirror=True)) == ["G", "delta"]
 
 
+def test_two_balls_hold_a_short_pair_in_a_tight_drum():
+    pair = DumbbellPair(2.2, 1.0, 0.5, 2.2)
+    assert kinds(pair_minima(pair, starts=400, mirror=True)) == ["200", "G", "staggered"]
+
+
 @pytest.mark.parametrize("rod", [0.2, 0.5])
 def test_what_nests_changes_where_a_ball_begins_to_reach_the_other_rod(rod):
     limit = long_rod_length(1.0, rod)
