@@ -125,6 +125,8 @@ class EnclosedArc:
         Of the tubes; -1 where it is not shown.
     reason : str
         What is not shown; empty if nothing.
+    nodes : tuple of array
+        Approximate unknowns at the ends of the tubes.
     """
 
     face: Face
@@ -134,6 +136,7 @@ class EnclosedArc:
     reached: tuple[bool, bool]
     index: int
     reason: str
+    nodes: tuple[Array, ...] = ()
 
 
 def enclosed_arc(
@@ -145,12 +148,13 @@ def enclosed_arc(
 ) -> EnclosedArc:
     """Return the chain of tubes along approximate points of an arc, in ascending parameter."""
     units, tubes, flags = np.array(system.units), list[Tube](), list[_Ways]()
-    ends = points[0], points[-1]
+    ends, nodes = (points[0], points[-1]), list[Array]()
 
     def result(reached: tuple[bool, bool], reason: str) -> EnclosedArc:
         index = _index(tubes, options.bits)
         reason = reason or ("" if index >= 0 else "the index is not shown")
-        return EnclosedArc(system.face, tuple(tubes), ends, zeros, reached, index, reason)
+        places = (*nodes, points[-1])
+        return EnclosedArc(system.face, tuple(tubes), ends, zeros, reached, index, reason, places)
 
     waiting = [list(points)]
     missed = ""
@@ -164,6 +168,7 @@ def enclosed_arc(
                 ways = Undecided("two tubes", "they are not shown to be pieces of one curve")
             else:
                 tubes.append(found)
+                nodes.append(one)
                 flags.append(ways)
                 continue
         if len(course) == 2 and np.linalg.norm((two - one) / units) >= options.shortest:

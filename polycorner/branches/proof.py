@@ -1,8 +1,10 @@
 """Proofs of diagrams: their arcs, their events, and that there is nothing else."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from polycorner.branches.enclosed_events import (
     null_unknowns,
 )
 from polycorner.branches.proof_options import BranchProofOptions
+from polycorner.branches.saving import Evidence, ProvedArc, save_proof
 from polycorner.branches.tubes import PIN, CurveSystem, Image, Setting, point
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
@@ -59,6 +62,8 @@ class BranchProof(Checked, Printed):
         Boxes of coordinates and the parameter, in which there may be others.
     searched : bool
         Whether a box was searched for others.
+    evidence : Evidence or None
+        What it is saved with, if it is proved.
     """
 
     diagram: Diagram
@@ -68,6 +73,7 @@ class BranchProof(Checked, Printed):
     tubes: tuple[int, ...]
     open_boxes: Array = field(default_factory=lambda: np.zeros((0, 2, 0)))
     searched: bool = False
+    evidence: Evidence | None = field(default=None, repr=False)
 
     @property
     def proved(self) -> bool:
@@ -86,6 +92,38 @@ class BranchProof(Checked, Printed):
     def word(self) -> str:
         """What is known of the diagram: *followed*, *proved*, or *complete*."""
         return "complete" if self.complete else "proved" if self.proved else "followed"
+
+    @checked
+    def save(self, path: str | os.PathLike[str], *, progress: Progress = silent) -> Path:
+        """Save what is proved, with its evidence, for an independent checker; return the path.
+
+        The checker is run first.  It encloses curves less closely than :func:`prove_branches`, and
+        divides the box of a complete diagram anew, as far as the options of the proof allow.
+
+        See :mod:`polycorner.branches.saving`, and :mod:`polycorner.proofs.checker.diagrams` for
+        what the checker shows.
+
+        Parameters
+        ----------
+        path : path
+            The file, whose name ends in ``.zip``.
+        progress : callable, optional
+            Told the number of boxes.
+
+        Raises
+        ------
+        ValueError
+            If an arc or an event is not proved, or boxes are open; if the checker does not follow
+            the proof; or if the name does not end in ``.zip``.
+        OSError
+            If the file could not be written.
+        """
+        if not self.proved or self.evidence is None:
+            checks.refuse("save", "a diagram of which all arcs and events are proved", self)
+        if len(self.open_boxes):
+            expected = "a box without open parts, or a proof without a box"
+            checks.refuse("save", expected, f"{len(self.open_boxes)} open boxes")
+        return save_proof(path, self.diagram, self.evidence, progress)
 
     def __repr__(self) -> str:
         """Return what is proved in one line."""
@@ -190,6 +228,7 @@ def prove_branches(
         if searched:
             assert sides is not None
             left = prover.others(arcs, events, sides, progress)
+        evidence = prover.evidence(arcs, sides) if proved else None
     return BranchProof(
         diagram=diagram,
         arcs=tuple(arc.reason for arc in arcs),
@@ -198,6 +237,7 @@ def prove_branches(
         tubes=tuple(len(arc.tubes) for arc in arcs),
         open_boxes=left,
         searched=searched,
+        evidence=evidence,
     )
 
 
@@ -343,6 +383,17 @@ class _Prover:
         lifted = lifted_problem(self.problem, tuple(self.diagram.rates))
         sides = np.append(box.lower, interval[0]), np.append(box.upper, interval[1])
         return Cover(self.setting, lifted, tubes, sides, self.options).run(progress)
+
+    def evidence(self, arcs: Sequence[EnclosedArc], sides: Domain | None) -> Evidence:
+        """Return what the proof is saved with."""
+        proved = [
+            ProvedArc(a.face, (tuple(sorted(a.zeros[0])), tuple(sorted(a.zeros[1]))),
+                      np.array(a.nodes))
+            for a in arcs
+        ]  # fmt: skip
+        box = np.zeros((2, 0)) if sides is None else np.array([sides.lower, sides.upper])
+        equations = self.problem.rows - 1 - self.problem.inequalities
+        return Evidence.of(self.setting, proved, equations, self.options, box)
 
     def times(self, k: int, found: EnclosedEvent) -> Interval:
         """Return bounds of the parameter at an event."""

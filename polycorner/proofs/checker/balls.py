@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from flint import arb, arb_mat, fmpq
+from flint import acb_mat, arb, arb_mat, fmpq
 
 BITS, STEPS = 128, 60
 BESIDE = 2.0**-40  # to which points beyond a side are listed: wider than enclosures in doubles
@@ -43,7 +43,9 @@ def shown(x: arb) -> bool:
     return bool(x == 0)
 
 
-def square(x: arb) -> arb:
+def square(x: Any) -> Any:
+    if not isinstance(x, arb):  # a jet
+        return x * x
     return (x.abs_lower() ** 2).union(x.abs_upper() ** 2)
 
 
@@ -90,6 +92,21 @@ def definite(rows: list[list[arb]]) -> bool:
     (pivot, *row), *rest = rows
     left = [[x - r[0] * y / pivot for x, y in zip(r[1:], row, strict=True)] for r in rest]
     return pivot > 0 and definite(left)
+
+
+def negatives(form: list[list[arb]]) -> int | None:
+    """Return how many eigenvalues of a symmetric matrix are negative; None if not decided."""
+    # a matrix of the same inertia, whose eigenvalues are not multiple by structure
+    units = [arb(7 * i + 9) / (3 * i + 8) for i in range(len(form))]
+    rows = [
+        [u * w * x for w, x in zip(units, row, strict=True)]
+        for u, row in zip(units, form, strict=True)
+    ]
+    try:
+        found = [x.real for x in acb_mat(arb_mat(rows)).eig()] if rows else []
+    except ValueError:
+        return None
+    return sum(x < 0 for x in found) if all(x < 0 or x > 0 for x in found) else None
 
 
 def zero(equations: Callable[..., Any], unknowns: list[arb]) -> list[arb] | None:

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from flint import acb_mat, arb, arb_mat
+from flint import arb, arb_mat
 
-from .balls import BESIDE, ZERO, definite, dot, hull, moved, need, nothing, shown, sides, turn, zero
+from .balls import BESIDE, ZERO, definite, dot, hull, moved, need, negatives, nothing, shown, sides, turn, zero
 from .problem import StoredProblem
 
 MOST_UNKNOWNS = 600  # of a point, with its multipliers
@@ -180,19 +180,10 @@ class StoredRegion:
         """
         exact = [x.mid() for x in self.unknowns]
         n, (_, jacobian) = len(self.places), self.equations(exact, middle=True)
-        units = [arb(7 * i + 9) / (3 * i + 8) for i in range(len(jacobian))]
-        # a symmetric matrix of the same inertia, whose eigenvalues are not multiple by structure
-        signed = [
-            (u if i < n else -u, row)
-            for i, (u, row) in enumerate(zip(units, jacobian, strict=True))
-        ]
-        form = [[u * w * x for w, x in zip(units, row, strict=True)] for u, row in signed]
-        try:
-            found = [x.real for x in acb_mat(arb_mat(form)).eig()] if form else []
-        except ValueError:
-            return None
-        decided = all(x < 0 or x > 0 for x in found)
-        return sum(x < 0 for x in found) - len(self.rows) + 1 if decided else None
+        # multiplied by -1 in the rows of the multipliers it is symmetric
+        form = [row if i < n else [-x for x in row] for i, row in enumerate(jacobian)]
+        found = negatives(form)
+        return None if found is None else found - len(self.rows) + 1
 
     def descends(self) -> None:
         """Check that ``v = -C (z - z*)`` descends at a locus, and that nothing else is read."""

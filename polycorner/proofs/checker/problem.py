@@ -9,6 +9,7 @@ from .balls import BITS, NAN, ZERO, different, dot, hull, need, number, places, 
 from .operations import LOGICAL, SLOPES, VALUES, arity, chain, ordered, unite
 
 FORMAT, CORNERS = ["polycorner-stationary-list", 1], ["polycorner-corner-list", 1]
+DIAGRAM = ["polycorner-diagram", 1]
 
 
 class StoredProgram:
@@ -133,7 +134,8 @@ class StoredProblem(StoredProgram):
 
     def __init__(self, data: dict[str, Any]) -> None:
         super().__init__(data)
-        need(data["format"] in (FORMAT, CORNERS), f"the format is {data['format']}, not {FORMAT}")
+        known = data["format"] in (FORMAT, CORNERS, DIAGRAM)
+        need(known, f"the format is {data['format']}, not {FORMAT}")
         self.lower, self.upper = sides(data["domain"], ("lower", "upper"), self.n)
         self.anywhere = hull(self.lower, self.upper)
         self.widths = [b - a for a, b in zip(self.lower, self.upper, strict=True)]

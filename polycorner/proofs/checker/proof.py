@@ -43,6 +43,11 @@ class StoredProof:
         self.symmetries, self.periodic = symmetries(p, data)
         self.tested = sum(region.tested for region in self.regions)
 
+    @property
+    def axes(self) -> Sequence[int]:
+        """The coordinates along which boxes are bisected."""
+        return self.p.free
+
     def closed(self, lower: list[float], upper: list[float], hints: list[Any]) -> bool:
         """Whether a box is closed rightly, or every piece of a bisection of it."""
         ways = [[arb(x) for x in h] for h in hints]
@@ -51,8 +56,8 @@ class StoredProof:
         for _ in range(PIECES):
             lo, hi = waiting.pop()
             if not self.shown(lo, hi, ways):
-                shares = [(hi[i] - lo[i]) / self.p.widths[i] for i in self.p.free]
-                axis = self.p.free[shares.index(max(shares))] if shares else 0
+                shares = [(hi[i] - lo[i]) / self.p.widths[i] for i in self.axes]
+                axis = self.axes[shares.index(max(shares))] if shares else 0
                 middle = 0.5 * (lo[axis] + hi[axis])
                 if not lo[axis] < middle < hi[axis]:
                     return False

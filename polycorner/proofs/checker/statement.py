@@ -168,12 +168,9 @@ class StoredStatement:
         return f"its energy is between {low} and {high}"
 
 
-def zero_near(system: Any, start: list[arb], around: Any = None) -> list[arb]:
-    """Enclose a zero near a point: Newton's steps, then Krawczyk's operator.
-
-    For systems with parameters ``around`` is that for all of their values.
-    """
-    x, last, around = start, arb("inf"), around or system
+def approach(system: Any, start: Sequence[arb]) -> list[arb]:
+    """Return an approximate zero near a point, by Newton's steps."""
+    x, last = list(start), arb("inf")
     for _ in range(STEPS):
         moved = [step.mid() for step in newton(system, x)]
         x = [(a - b).mid() for a, b in zip(x, moved, strict=True)]
@@ -181,6 +178,15 @@ def zero_near(system: Any, start: list[arb], around: Any = None) -> list[arb]:
         if not size < last / 2:
             break
         last = size
+    return x
+
+
+def zero_near(system: Any, start: Sequence[arb], around: Any = None) -> list[arb]:
+    """Enclose a zero near a point: Newton's steps, then Krawczyk's operator.
+
+    For systems with parameters ``around`` is that for all of their values.
+    """
+    x, around = approach(system, start), around or system
     tiny = arb(2) ** (SLACK - ctx.prec)
     moved = [step.abs_upper() + (1 + a.abs_upper()) * tiny
              for a, step in zip(x, newton(around, x), strict=True)]  # fmt: skip

@@ -21,9 +21,9 @@ QUARTERS = {"sin": ("sin", "cos"), "cos": ("cos", "sin")}  # after a quarter of 
 class TurnedAlgebra(Algebra):
     """Algebra that knows even and odd functions, quarters of turns, and images of coordinates."""
 
-    moving: "StoredSymmetry | None" = None
+    moving: Any = None
 
-    def at(self, g: "StoredSymmetry") -> "TurnedAlgebra":
+    def at(self, g: Any) -> "TurnedAlgebra":
         """Return the algebra at the image of a point, with the same symbols."""
         found = TurnedAlgebra(self.p)
         found.keys, found.places, found.work, found.moving = self.keys, self.places, self.work, g

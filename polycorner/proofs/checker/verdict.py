@@ -1,4 +1,4 @@
-"""Verdict on a file: its parts, its leaves and the list that it claims."""
+"""Verdict on a file: its parts, its leaves and the list or the diagram that it claims."""
 
 import json
 import math
@@ -21,7 +21,8 @@ from flint import arb
 
 from .balls import NotShownError, moved, need
 from .corners import StoredCorners
-from .problem import CORNERS, StoredProblem
+from .diagrams import StoredDiagram
+from .problem import CORNERS, DIAGRAM, StoredProblem
 from .proof import StoredProof
 from .statement import PROOF
 from .statements import stated
@@ -64,7 +65,7 @@ def contents(path: str) -> tuple[dict[str, Any], list[Any]]:
         need(sum(part.file_size for part in archive.filelist) <= room, "a part is far too large")
         text = unpacked(archive, "problem.json", min(room, MOST_TEXT))
         data = json.loads(text, object_pairs_hook=once)
-        if data["format"] == PROOF:
+        if data["format"] == PROOF or (data["format"] == DIAGRAM and data["domain"] is None):
             return data, []
         for name, kind in kinds.items():
             parts.append(array(kind, unpacked(archive, f"{name}.bin", room)))
@@ -109,7 +110,9 @@ def follow() -> None:
 
 def begin(data: dict[str, Any]) -> None:
     Thread(target=follow, daemon=True).start()
-    WORKER[:] = [(StoredCorners if data["format"] == CORNERS else StoredProof)(data)]
+    kinds = (CORNERS, StoredCorners), (DIAGRAM, StoredDiagram)
+    (kind,) = [kind for form, kind in kinds if data["format"] == form] or [StoredProof]
+    WORKER[:] = [kind(data)]
 
 
 def failing(chunk: list[Any]) -> Any:
@@ -122,8 +125,11 @@ def check(path: str, sample: int | None, jobs: int) -> str:
     if data["format"] == PROOF:
         return f"verified: {stated(data)}"
     begin(data)
-    proof, (total, opened) = WORKER[0], (parts[0].count(code) for code in (-1, -2))
+    proof = WORKER[0]
     proof.check_list(data)
+    if not parts:
+        return f"verified: {', '.join(said(proof))}"
+    total, opened = (parts[0].count(code) for code in (-1, -2))
     need(
         type(data["open"]) is int and opened == data["open"],
         f"{opened} boxes are open, not {data['open']}",
@@ -147,6 +153,9 @@ def check(path: str, sample: int | None, jobs: int) -> str:
 
 def said(proof: StoredProof) -> Iterator[str]:
     """Yield what a proof shows of points and loci, once its list is checked."""
+    if isinstance(proof, StoredDiagram):
+        yield from proof.said()
+        return
     tested = sum(not g.proved for g in proof.symmetries)
     images = f" and their images under {len(proof.symmetries)} symmetries"
     images += f" ({tested} of them tested, not proved)" if tested else ""
