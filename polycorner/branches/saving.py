@@ -1,10 +1,11 @@
 """Proofs of diagrams as plain data, in archives that :mod:`~polycorner.proofs.checker` verifies.
 
-A file is a zip archive like that of a list (:mod:`polycorner.proofs.files`).  In ``problem.json`` are
-the functions as one program, whose last input is the parameter ``t``; its interval; for each arc the
-functions that it holds, points along it with their multipliers, what vanishes at its ends, the
-numbers of its events and its index; for each event its kind.  If a box was searched the other parts
-have its subdivision, with directions for its leaves, which is made here by the checker's own test.
+A file is a zip archive like that of a list (:mod:`polycorner.proofs.files`).  In ``problem.json``
+are the functions as one program, whose last input is the parameter ``t``; its interval; for each
+arc the functions that it holds, points along it with their multipliers, what vanishes at its ends,
+the numbers of its events and its index; for each event its kind.  If a box was searched the other
+parts have its subdivision, with directions for its leaves, which is made here by the checker's own
+test.
 """
 
 import json
@@ -23,7 +24,8 @@ from polycorner.branches.diagram import Diagram
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.branches.tubes import Image, Setting
-from polycorner.intervals.balls import precision
+from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.enclosures import Formulas
 from polycorner.progress import Progress
 from polycorner.proofs.checker.balls import BITS, NotShownError, hull, moved
 from polycorner.proofs.checker.diagrams import StoredDiagram
@@ -118,6 +120,7 @@ def save_proof(
     with precision(BITS):
         try:
             proof = StoredDiagram(data)
+            "".join(proof.said())
         except NotShownError as error:
             msg = f"save: expected a proof that the checker follows; it says: {error}"
             raise ValueError(msg) from None
@@ -128,8 +131,6 @@ def save_proof(
 
 
 def _described(diagram: Diagram, evidence: Evidence) -> dict[str, Any]:
-    from polycorner.intervals.enclosures import Formulas
-
     problem, (low, high) = diagram.problem, diagram.interval
     n, m = problem.dimension, problem.inequalities
     names, count = tuple(diagram.rates), len(diagram.rates)
@@ -246,9 +247,7 @@ def _closing(
     ways = list(_ways(proof, evidence, lo, hi))
     if not ways:
         return None
-    from flint import arb
-
-    balls = [[arb(x) for x in way] for way in ways]
+    balls = [[ball(x) for x in way] for way in ways]
     return ways if proof.shown(lo, hi, balls) else None
 
 

@@ -1,18 +1,19 @@
 """Arcs of equilibria as chains of tubes, along which nothing vanishes but at their ends.
 
-*Watched* are the functions that are open, the multipliers of those that are held and of the energy,
-the distances of the parameter from both ends of its interval, and its derivative along the arc, in
-this order, those of a function under its number.  On each tube each of them is positive; or it
-vanishes at the start of the arc and grows, or at its end and falls.  As nothing falls before it
-grows, all are positive between the ends.
+*Watched* are the functions that are open, the multipliers of those that are held and of the
+energy, the distances of the parameter from both ends of its interval, and its derivative along the
+arc, in this order, those of a function under its number.  On each tube each of them is positive;
+or it vanishes at the start of the arc and grows, or at its end and falls.  As nothing falls before
+it grows, all are positive between the ends.
 
-Between them ``mu_0 > 0`` and ``t' > 0``, so that the KKT matrix is regular: a vector ``(u, v)`` that
-it annihilates gives one, ``(u, 0, v + s mu)``, that the derivatives of the equations annihilate, and
-which is not along the curve.  The index, the number of negative eigenvalues of the Lagrangian's
-Hessian along the face, is therefore the same on all of the arc.
+Between them ``mu_0 > 0`` and ``t' > 0``, so that the KKT matrix is regular: a vector ``(u, v)``
+that it annihilates gives one, ``(u, 0, v + s mu)``, that the derivatives of the equations
+annihilate, and which is not along the curve.  The index, the number of negative eigenvalues of the
+Lagrangian's Hessian along the face, is therefore the same on all of the arc.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 from flint import arb
@@ -74,7 +75,7 @@ class StoredArc:
     def __init__(self, family: StoredFamily, record: dict[str, Any], name: str) -> None:
         self.name, self.watched = name, Watched(family)
         active = places(record["active"], family.p.m, f"{name}: active functions")
-        need(all(a < b for a, b in zip(active, active[1:], strict=False)), f"{name}: active")
+        need(all(a < b for a, b in pairwise(active)), f"{name}: active")
         self.face = StoredFace(family, active)
         zeros = [places(some, self.watched.count, f"{name}: zeros") for some in record["zeros"]]
         need(len(zeros) == 2, f"{name}: zeros at both ends")
@@ -85,11 +86,12 @@ class StoredArc:
         self.nodes = nodes
         self.tubes, self.glue, self.ways = list[Tube](), list[list[arb]](), list[dict[int, int]]()
         try:
-            for one, two in zip(nodes, nodes[1:], strict=False):
+            for one, two in pairwise(nodes):
                 self.follow(one, two, HALVINGS)
             self.check_order()
         except NotShownError as error:
-            raise NotShownError(f"{name}: {error}") from None
+            msg = f"{name}: {error}"
+            raise NotShownError(msg) from None
         self.ends: list[list[arb]] = [[], []]  # the unknowns at the events
 
     def follow(self, one: Sequence[arb], two: Sequence[arb], halvings: int) -> None:
@@ -120,7 +122,7 @@ class StoredArc:
         return [x]
 
     def signs(self, tube: Tube) -> dict[int, int]:
-        """Return what grows from zero at the start, or falls to zero at the end; all else is positive."""
+        """Return what grows from zero at the start or falls to zero at the end, by number."""
         ways = dict[int, int]()
         for which, value in enumerate(self.watched.values(tube)):
             if value > 0:
@@ -136,9 +138,18 @@ class StoredArc:
     def words(self, which: int) -> str:
         w = self.watched
         if which < w.m:
-            return f"the multiplier of function {which}" if which in self.face.active else f"function {which}"
-        return ("the multiplier of the energy", "the distance from the start of the interval",
-                "the distance from its end", "the derivative of the parameter")[which - w.m]  # fmt: skip
+            return (
+                f"the multiplier of function {which}"
+                if which in self.face.active
+                else f"function {which}"
+            )
+        others = (
+            "the multiplier of the energy",
+            "the distance from the start of the interval",
+            "the distance from its end",
+            "the derivative of the parameter",
+        )
+        return others[which - w.m]
 
     def check_order(self) -> None:
         """Check that nothing grows after it fell, and that points come one after another."""
@@ -186,5 +197,5 @@ class StoredArc:
             found = negatives(form)
             if found is not None:
                 return found - len(rows)
-        raise NotShownError(f"{self.name}: the index is not decided")
-
+        msg = f"{self.name}: the index is not decided"
+        raise NotShownError(msg)

@@ -3,17 +3,17 @@
 Functions are ``f_i >= 0``, ``h_j = 0`` and the energy ``E``, of coordinates ``q`` and a parameter
 ``t``, each multiplied by a positive weight.  On a face ``A`` the unknowns are ``x = (q, t, mu)``:
 
-==============================================================  =====================================
+==============================================================  ===================================
 ``mu_0 dE - sum_A mu_i df_i - sum nu_j dh_j = 0``               derivatives by ``q``
 ``f_i = 0`` for ``i`` in ``A``, ``h_j = 0``                     the point is on the face
 ``sum_A mu_i + mu_0 = 1``                                       one multiple of each relation
-==============================================================  =====================================
+==============================================================  ===================================
 
-one equation less than there are unknowns.  A *pin* ``c (x - a) = delta`` joins them.  A tube is a box
-``z_0 + z_1 delta + W`` for ``delta`` between ``-r`` and ``r`` in which Krawczyk's operator shows that
-they have exactly one solution for each ``delta``, and that all matrices of derivatives ``J`` are
-regular: the solutions are one curve, whose velocity is given by ``J x' = (0, 1)`` and whose
-acceleration by ``J x'' = -F''(x', x')``.
+one equation less than there are unknowns.  A *pin* ``c (x - a) = delta`` joins them.  A tube is a
+box ``z_0 + z_1 delta + W`` for ``delta`` between ``-r`` and ``r`` in which Krawczyk's operator
+shows that they have exactly one solution for each ``delta``, and that all matrices of derivatives
+``J`` are regular: the solutions are one curve, whose velocity is given by ``J x' = (0, 1)`` and
+whose acceleration by ``J x'' = -F''(x', x')``.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from typing import Any
 
 from flint import arb, arb_mat, ctx
 
-from .balls import ZERO, NotShownError, dot, need
+from .balls import ZERO, NotShownError, dot, need, square
 from .jets import Jet
 from .problem import StoredProgram
 from .rationals import ratios
@@ -73,7 +73,9 @@ class StoredFamily:
         for row in rows:
             form = self.p.forms(jets, row, changes, 2) or ({}, {})
             slopes = {ij: x.slope for ij, x in form[1].items() if isinstance(x, Jet)}
-            need(all(x.is_finite() for x in slopes.values()), "a function is not shown to be smooth")
+            need(
+                all(x.is_finite() for x in slopes.values()), "a function is not shown to be smooth"
+            )
             turned.append(slopes)
         return [hessian for _, _, hessian in found], turned
 
@@ -157,7 +159,7 @@ class StoredFace:
             found = arb_mat([*jacobian, row]).mid().solve(last).entries()
         except ZeroDivisionError:
             need(False, "the equations are not shown to have one curve at an event")
-        size = sum(((y / u) ** 2 for y, u in zip(found, self.units, strict=True)), ZERO).sqrt()
+        size = sum((square(y / u) for y, u in zip(found, self.units, strict=True)), ZERO).sqrt()
         return [(y / size).mid() for y in found]
 
     def velocity(self, x: Sequence[arb], along: Sequence[arb]) -> list[arb]:
@@ -287,14 +289,14 @@ class Tube:
     def value(self, row: int) -> arb:
         """Enclose a function along the curve, in mean value form if it is smooth."""
         p, d = self.face.family.p, self.face.d
-        found = p.values(self.x[:d])[p.outputs[row]]
+        found: arb = p.values(self.x[:d])[p.outputs[row]]
         if found > 0 or found < 0:
             return found
         try:
             rate = self.rate(row)
         except NotShownError:
             return found
-        middle = p.values(self.point()[:d])[p.outputs[row]]
+        middle: arb = p.values(self.point()[:d])[p.outputs[row]]
         return middle + PART * self.reach * rate
 
     def point(self) -> list[arb]:
@@ -305,9 +307,7 @@ class Tube:
         return self._point
 
 
-def chord(
-    face: StoredFace, one: Sequence[arb], two: Sequence[arb]
-) -> tuple[list[arb], list[arb]]:
+def chord(face: StoredFace, one: Sequence[arb], two: Sequence[arb]) -> tuple[list[arb], list[arb]]:
     """Return the normal of the pin that grows by 1 from one point to another, and the middle."""
     way = [b - a for a, b in zip(one, two, strict=True)]
     scaled = [y / u**2 for y, u in zip(way, face.units, strict=True)]
@@ -321,4 +321,3 @@ def between(face: StoredFace, one: Sequence[arb], two: Sequence[arb]) -> list[ar
     """Return a point near the curve between two others."""
     normal, middle = chord(face, one, two)
     return approach(face.pinned(normal, middle), middle)
-

@@ -1,30 +1,32 @@
 """Bifurcation diagrams: arcs of equilibria over a parameter, and the events at which they end.
 
-Let ``D_t = {f_i(q, t) >= 0, h_j(q, t) = 0}``.  An *equilibrium* is a point of ``D_t`` with
-``dE = sum lam_i df_i + sum mu_j dh_j``, ``lam_i >= 0``, and ``lam_i = 0`` where ``f_i > 0``.  Of a
-file that is verified this is true, of the functions and the interval that it states:
+Let ``D_t = {f_i(q, t) >= 0, h_j(q, t) = 0}``.  An *equilibrium* is a point of ``D_t`` with ``dE =
+sum lam_i df_i + sum mu_j dh_j``, ``lam_i >= 0``, and ``lam_i = 0`` where ``f_i > 0``.  Of a file
+that is verified this is true, of the functions and the interval that it states:
 
-1. Each *arc* is a curve ``(q, t)``, along which ``t`` grows, from the point of one event to that of
-   another.  Between them all its points are equilibria, at which the functions of the arc vanish with
-   multipliers ``lam_i > 0``, all others are positive, the KKT matrix is regular and the Lagrangian's
-   Hessian has as many negative eigenvalues along the face as is said.  No two arcs have a point in
-   common.
-2. Each *event* is a point; no two are the same.  In a neighbourhood of it, for ``t`` in the interval,
-   all equilibria are on the arcs of the file that end there, or the point itself.  At a *fold* two
-   arcs of one face meet on one side, at a *corner limit* two of different faces; where a contact
-   *opens* or *closes*, or one is *exchanged* for another, one arc ends and one begins; at a *branch*
-   more than two arcs meet; at *dependent* gradients, or where the set *vanishes* but for the point,
-   one arc ends, as it does at an *end* of the interval.
-3. If a box is stated, all equilibria in it, for all ``t`` of the interval, are on arcs or at events.
+1. Each *arc* is a curve ``(q, t)``, along which ``t`` grows, from the point of one event to that
+   of another. Between them all its points are equilibria, at which the functions of the arc
+   vanish with multipliers ``lam_i > 0``, all others are positive, the KKT matrix is regular and
+   the Lagrangian's Hessian has as many negative eigenvalues along the face as is said. No two
+   arcs have a point in common.
+2. Each *event* is a point; no two are the same. In a neighbourhood of it, for ``t`` in the
+   interval, all equilibria are on the arcs of the file that end there, or the point itself. At a
+   *fold* two arcs of one face meet on one side, at a *corner limit* two of different faces; where
+   a contact *opens* or *closes*, or one is *exchanged* for another, one arc ends and one begins;
+   at a *branch* more than two arcs meet; at *dependent* gradients, or where the set *vanishes*
+   but for the point, one arc ends, as it does at an *end* of the interval.
+3. If a box is stated, all equilibria in it, for all ``t`` of the interval, are on arcs or at
+   events.
 
-For 3 the box is divided.  A part holds no equilibrium if a function is negative on it, or an equation
-not 0; or if some direction, tangent to the equations, increases all functions that may vanish and
-decreases the energy.  Otherwise each set ``A`` of at most ``n`` of these functions, less the number of
-equations, is looked at, on which an equilibrium may have positive multipliers (Caratheodory): there
-is a direction for it, or all solutions of its equations in the part lie on the curve of a tube.  Of a
-point of this curve with ``f >= 0``, ``mu >= 0`` and ``t`` in the interval it is known that it is on the
-diagram: the curve has a point of the diagram, and what is watched is positive or monotone on the tube,
-so that it is not negative on one piece of the curve; there arcs end only where two of them meet.
+For 3 the box is divided.  A part holds no equilibrium if a function is negative on it, or an
+equation not 0; or if some direction, tangent to the equations, increases all functions that may
+vanish and decreases the energy.  Otherwise each set ``A`` of at most ``n`` of these functions,
+less the number of equations, is looked at, on which an equilibrium may have positive multipliers
+(Caratheodory): there is a direction for it, or all solutions of its equations in the part lie on
+the curve of a tube.  Of a point of this curve with ``f >= 0``, ``mu >= 0`` and ``t`` in the
+interval it is known that it is on the diagram: the curve has a point of the diagram, and what is
+watched is positive or monotone on the tube, so that it is not negative on one piece of the curve;
+there arcs end only where two of them meet.
 """
 
 from collections import Counter
@@ -36,12 +38,13 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .arcs import StoredArc, Watched
-from .balls import NAN, ZERO, NotShownError, dot, hull, need, places, turn
+from .balls import BITS, NAN, ZERO, NotShownError, dot, hull, need, places, turn
 from .curves import StoredFace, StoredFamily, Tube
 from .events import StoredEvent, StoredImage
 from .problem import DIAGRAM, StoredProblem, StoredProgram
 from .proof import MOST_SETS, StoredProof
 from .rationals import decimals
+from .statement import PART
 from .symmetries import StoredSymmetry, TurnedAlgebra
 
 MOST_TOLD = 12  # events that are told one by one
@@ -245,14 +248,14 @@ class StoredDiagram(StoredProof):
             yield "nothing is said of other curves"
 
     def told(self) -> Iterator[str]:
-        """Yield events that are no ends of the interval, with bounds of the parameter; and others."""
+        """Yield events with bounds of the parameter, and the number of the ends of the interval."""
         t, kinds = self.family.n, Counter(event.kind for event in self.events)
         several = sum(kinds.values()) - kinds["end"]
         for event in self.events if several <= MOST_TOLD else ():
             if event.kind != "end":
-                low, high = decimals(event.x[t], event.x[t])
+                x = event.x[t] + PART * arb(2) ** -BITS  # wide enough to be printed
+                low, high = decimals(x, x)
                 yield f"{event.kind.replace('_', ' ')} between {low} and {high}"
         for kind, number in sorted(kinds.items()):
             if several > MOST_TOLD or kind == "end":
                 yield f"{number} of the kind {kind.replace('_', ' ')}"
-

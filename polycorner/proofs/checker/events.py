@@ -2,24 +2,26 @@
 
 Let ``(q, t)`` be the point and ``F`` the functions whose multipliers are positive there.
 
-*Contacts.*  Functions ``W`` vanish with multipliers 0, and all gradients of ``F + W`` and the
-equations are independent.  Near the point multipliers are unique and nearly the same; an equilibrium
-has positive ones on ``F + V`` for some ``V`` in ``W``.  For each ``V`` the equations have one curve
-through the point, along which the multipliers of ``V`` and the functions of the rest of ``W`` have
-derivatives other than zero: on a side on which all of them grow there are equilibria, on others not.
+*Contacts.* Functions ``W`` vanish with multipliers 0, and all gradients of ``F + W`` and the
+equations are independent.  Near the point multipliers are unique and nearly the same; an
+equilibrium has positive ones on ``F + V`` for some ``V`` in ``W``.  For each ``V`` the equations
+have one curve through the point, along which the multipliers of ``V`` and the functions of the
+rest of ``W`` have derivatives other than zero: on a side on which all of them grow there are
+equilibria, on others not.
 
-*A corner with one function too many.*  ``n + 1`` functions vanish, equations among them, whose
+*A corner with one function too many.* ``n + 1`` functions vanish, equations among them, whose
 derivatives by ``q`` and ``t`` are independent.  Without any one ``l`` of them the gradients are
-independent, with multipliers of which all are positive or one is negative.  An equilibrium nearby has
-positive multipliers on independent gradients, which tend to multipliers without negative ones: it is
-that of all functions but one, ``l``, and ``f_l`` grows on one side of its curve.
+independent, with multipliers of which all are positive or one is negative.  An equilibrium nearby
+has positive multipliers on independent gradients, which tend to multipliers without negative ones:
+it is that of all functions but one, ``l``, and ``f_l`` grows on one side of its curve.
 
-*Dependent gradients.*  The energy's multiplier vanishes and those of ``A`` are positive.  As the
-curve is regular and ``t''`` does not vanish, it has no velocity ``(0, 0, mu')``, whose acceleration
-would be 0, and the multipliers are the only ones, up to their size.  So those of equilibria nearby are
-nearly the same: they are on the curve, on the side where the energy's multiplier is positive.
+*Dependent gradients.* The energy's multiplier vanishes and those of ``A`` are positive.  As the
+curve is regular and ``t''`` does not vanish, it has no velocity ``(0, 0, mu')``, whose
+acceleration would be 0, and the multipliers are the only ones, up to their size.  So those of
+equilibria nearby are nearly the same: they are on the curve, on the side where the energy's
+multiplier is positive.
 
-*A fold.*  All signs are strict, ``t' = 0`` and ``t''`` does not vanish.  As before no velocity is
+*A fold.* All signs are strict, ``t' = 0`` and ``t''`` does not vanish.  As before no velocity is
 ``(0, 0, mu')``, so that the multipliers are unique and equilibria nearby are on the curve; the two
 arcs are its two sides.
 """
@@ -68,7 +70,8 @@ class StoredEvent:
             inside = zeros in ({w.start}, {w.end}) or (t > w.low and t < w.high)
             need(inside, "the parameter is not inside its interval")
         except NotShownError as error:
-            raise NotShownError(f"{name}: {error}") from None
+            msg = f"{name}: {error}"
+            raise NotShownError(msg) from None
 
     def only(self) -> End:
         need(len(self.ends) == 1, "more than one arc ends there")
@@ -127,7 +130,7 @@ class StoredEvent:
             return tube
         raise NotShownError(reason)
 
-    # --------------------------------------------------------------------------- dependent gradients
+    # -------------------------------------------------------------------------- dependent gradients
 
     def dependent(self) -> tuple[list[arb], str]:
         """Show an event at which the energy's multiplier vanishes."""
@@ -164,7 +167,7 @@ class StoredEvent:
         others = (i for i in range(p.m) if i not in closed)
         need(all(v[p.outputs[i]] > 0 for i in others), "another function may vanish")
 
-    # -------------------------------------------------------------------------------------- contacts
+    # ------------------------------------------------------------------------------------ contacts
 
     def contacts(self, weak: list[int]) -> tuple[list[arb], str]:
         """Show an event at which multipliers vanish and functions do."""
@@ -243,8 +246,8 @@ class StoredEvent:
     def together(self, face: StoredFace, first: int, other: int, x: list[arb]) -> bool:
         """Whether a symmetry shows that two multipliers are the same at a point of a face.
 
-        It takes the face to itself and keeps the parameter, of which the solution is a function that
-        is unique nearby: where the image of the point is near, it is the point.
+        It takes the face to itself and keeps the parameter, of which the solution is a function
+        that is unique nearby: where the image of the point is near, it is the point.
         """
         n, d, full = face.n, face.d, face.active
         along = [u * int(i == n) for i, u in enumerate(face.units)]
@@ -255,14 +258,18 @@ class StoredEvent:
                 same = all(shown_equal(weights[i], weights[g.functions[i]]) for i in full)
                 mu = [x[d + full.index(g.functions[i])] for i in full]
                 image = [s * x[i] for i, s in zip(g.order, g.signs, strict=True)]
-                if same and about.contains(x) and about.contains([*image, *mu, *x[d + len(full) :]]):
+                if (
+                    same
+                    and about.contains(x)
+                    and about.contains([*image, *mu, *x[d + len(full) :]])
+                ):
                     return True
         return False
 
     # --------------------------------------------------------------------- one function too many
 
     def corner(self, full: list[int]) -> tuple[list[arb], str]:
-        """Show an event at a corner at which one function more vanishes than there are coordinates."""
+        """Show an event at which one function more vanishes than there are coordinates."""
         family, n = self.family, self.family.n
         rows = [*full, *range(family.p.m, family.energy)]
         need(len(rows) == n + 1, "several functions too many vanish")
@@ -270,7 +277,9 @@ class StoredEvent:
         self.check_open(x, full)
         _, _, found = family.forms(x, [*rows, family.energy])
         pairs = zip([*rows, family.energy], found, strict=True)
-        slopes = {r: [family.weights[r] * g.get(i, ZERO) for i in range(n)] for r, (_, g, _) in pairs}
+        slopes = {
+            r: [family.weights[r] * g.get(i, ZERO) for i in range(n)] for r, (_, g, _) in pairs
+        }
         arms = list[End]()
         for gap in full:
             others = [r for r in rows if r != gap]
@@ -312,7 +321,9 @@ class StoredImage:
     ``(g q)_i = signs_i q_{order_i}`` and ``f_i(g q) = f_{functions_i}(q)``, shown by algebra.
     """
 
-    def __init__(self, family: StoredFamily, record: dict[str, Any], algebra: TurnedAlgebra) -> None:
+    def __init__(
+        self, family: StoredFamily, record: dict[str, Any], algebra: TurnedAlgebra
+    ) -> None:
         p, n = family.p, family.n
         need(p.k == 0, "a symmetry is given, and equations")
         self.order = [*places(record["order"], n, "a symmetry"), n]
@@ -327,6 +338,7 @@ class StoredImage:
             one, two = moved.value(p.outputs[row]), algebra.value(p.outputs[kept])
             known = isinstance(one, dict) and isinstance(two, dict)
             need(known and one == total({}, two), "a symmetry is not shown by algebra")
+        algebra.work = moved.work
 
 
 def kind(arms: Sequence[End]) -> str:

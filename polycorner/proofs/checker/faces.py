@@ -4,7 +4,21 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import BESIDE, ZERO, definite, dot, hull, moved, need, negatives, nothing, shown, sides, turn, zero
+from .balls import (
+    BESIDE,
+    ZERO,
+    definite,
+    dot,
+    hull,
+    moved,
+    need,
+    negatives,
+    nothing,
+    shown,
+    sides,
+    turn,
+    zero,
+)
 from .problem import StoredProblem
 
 MOST_UNKNOWNS = 600  # of a point, with its multipliers

@@ -52,10 +52,11 @@ class Jet:
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> "Jet":
-        return self + -other
+        x, dx = parts(other)
+        return Jet(self.value - x, self.slope - dx)
 
     def __rsub__(self, other: Any) -> "Jet":
-        return -self + other
+        return Jet(*parts(other)) - self
 
     def __mul__(self, other: Any) -> "Jet":
         x, dx = parts(other)
@@ -85,7 +86,7 @@ class Jet:
     def __rpow__(self, other: Any) -> "Jet":
         return Jet(*parts(other)) ** self
 
-    # --------------------------------------------------------------------------- elementary functions
+    # ------------------------------------------------------------------------ elementary functions
 
     def sqrt(self) -> "Jet":
         root = self.value.sqrt()

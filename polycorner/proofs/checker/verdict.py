@@ -110,9 +110,8 @@ def follow() -> None:
 
 def begin(data: dict[str, Any]) -> None:
     Thread(target=follow, daemon=True).start()
-    kinds = (CORNERS, StoredCorners), (DIAGRAM, StoredDiagram)
-    (kind,) = [kind for form, kind in kinds if data["format"] == form] or [StoredProof]
-    WORKER[:] = [kind(data)]
+    kinds: dict[Any, type[StoredProof]] = {CORNERS[0]: StoredCorners, DIAGRAM[0]: StoredDiagram}
+    WORKER[:] = [kinds.get(data["format"][0], StoredProof)(data)]
 
 
 def failing(chunk: list[Any]) -> Any:
