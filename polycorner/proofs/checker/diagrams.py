@@ -61,6 +61,7 @@ class StoredDiagram(StoredProof):
         self.searched = data["domain"] is not None
         self.p: Any = (StoredProblem if self.searched else StoredProgram)(data)
         self.family = family = StoredFamily(self.p, data)
+        need(all(isinstance(x, str) for x in data["functions"]), "names of functions are texts")
         algebra = TurnedAlgebra(self.p)
         images = [StoredImage(family, record, algebra) for record in data["symmetries"]]
         count = len(data["events"])
