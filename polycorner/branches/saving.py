@@ -223,8 +223,8 @@ def _cover(proof: StoredDiagram, evidence: Evidence, progress: Progress) -> dict
         if widths[axis] <= options.resolution or len(codes) >= options.max_boxes:
             names = p.names[:-1]
             where = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, lo, strict=False))
-            expected = "a proof that the checker follows; it leaves a box open near"
-            checks.refuse("save", expected, f"{where}, {p.names[-1]} = {lo[-1]:.6g}")
+            found = f"a box near {where}, {p.names[-1]} = {lo[-1]:.6g} that it leaves open"
+            checks.refuse("save", "a proof that the checker follows", found)
         middle = 0.5 * (lo[axis] + hi[axis])
         codes.append(axis)
         positions.append(middle)

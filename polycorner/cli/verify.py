@@ -1,4 +1,4 @@
-"""``polycorner verify``: saved proofs and lists, checked by a program of its own."""
+"""``polycorner verify``: saved proofs, lists and diagrams, checked by a program of its own."""
 
 from pathlib import Path
 
@@ -16,13 +16,13 @@ from polycorner.cli.output import deliver, working
     "--sample",
     type=click.IntRange(min=1),
     group="Check",
-    help="Check so many leaves of a list, drawn at random. [all]",
+    help="Check so many leaves of a list or a box, drawn at random. [all]",
 )
 @option("--jobs", type=click.IntRange(min=1), default=1, group="Check", help="Number of processes.")
 @option("--json", "as_json", is_flag=True, group="Output", help="Print JSON, not tables.")
 @config_option
 def verify(files: tuple[Path, ...], sample: int | None, jobs: int, as_json: bool) -> None:
-    """Check proofs and complete lists that were saved as FILE.
+    """Check proofs, complete lists and bifurcation diagrams that were saved as FILE.
 
     The checker shares no code with what proves.  The exit code is 1 if a file is not verified.
     """

@@ -1,5 +1,6 @@
-"""Checker of saved proofs: lists of stationary points or corners, and minima; python-flint alone.
+"""Checker of saved proofs: lists of stationary points or corners, minima and diagrams.
 
+It needs python-flint alone.
 ``python -m checker FILE [--sample K] [--jobs J]``, run where this folder or a copy of it is,
 differentiates the program in the file itself, walks the subdivision and shows of every closed box,
 in ball arithmetic of 128 bits, that
@@ -23,7 +24,8 @@ the point of a region only, or has independent gradients and too few of them for
 subset of the first two kinds.  Regions have one common zero of as many functions as there are
 coordinates, by Krawczyk's operator, or one that second order isolates.
 
-Files of single minima are checked by what ``growth.py`` and ``minimum.py`` state and prove.
+Files of single minima are checked by what ``growth.py`` and ``minimum.py`` state and prove, and
+bifurcation diagrams by what ``diagrams.py``, ``arcs.py`` and ``events.py`` do.
 
 What is shown is about the problem that the file states.  That its symmetries, and turns by the
 periods of its coordinates, preserve this problem is shown by exact algebra (``symmetries.py``), or

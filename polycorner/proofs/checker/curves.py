@@ -21,7 +21,7 @@ from typing import Any
 
 from flint import arb, arb_mat, ctx
 
-from .balls import ZERO, NotShownError, dot, need, square
+from .balls import NAN, ZERO, NotShownError, dot, need, square
 from .jets import Jet
 from .problem import StoredProgram
 from .rationals import ratios
@@ -187,6 +187,7 @@ class Tube:
         self, face: StoredFace, normal: Sequence[arb], anchor: Sequence[arb], reach: arb
     ) -> None:
         self.face, self.normal, self.anchor, self.reach = face, normal, anchor, reach
+        self.memo = dict[int, Any]()
         system = face.pinned(normal, anchor)
         self.centre = approach(system, anchor)
         values, jacobian = system(self.centre)
@@ -280,23 +281,30 @@ class Tube:
         bend = self.face.second(self.x, self.velocity)
         return solved(self.rows, [-y for y in bend])
 
+    @property
+    def values(self) -> list[Any]:
+        """Enclosures of all nodes of the program along the curve."""
+        if not hasattr(self, "_values"):
+            self._values = self.face.family.p.values(self.x[: self.face.d])
+        return self._values
+
     def rate(self, row: int) -> arb:
-        """Enclose the derivative of a function along the curve."""
-        d = self.face.d
-        _, _, ((_, gradient, _),) = self.face.family.forms(self.x[:d], [row])
-        return sum((y * self.velocity[i] for i, y in gradient.items()), ZERO)
+        """Enclose the derivative of a function along the curve, NaN if it may have none."""
+        found = self.face.family.p.forms(self.values, row, self.memo)
+        if found is None:
+            return NAN
+        return sum((y * self.velocity[i] for i, y in found[0].items()), ZERO)
 
     def value(self, row: int) -> arb:
-        """Enclose a function along the curve, in mean value form if it is smooth."""
-        p, d = self.face.family.p, self.face.d
-        found: arb = p.values(self.x[:d])[p.outputs[row]]
+        """Enclose a function along the curve, in mean value form where that is needed."""
+        p = self.face.family.p
+        found: arb = self.values[p.outputs[row]]
         if found > 0 or found < 0:
             return found
-        try:
-            rate = self.rate(row)
-        except NotShownError:
+        rate = self.rate(row)
+        if not rate.is_finite():
             return found
-        middle: arb = p.values(self.point()[:d])[p.outputs[row]]
+        middle: arb = p.values(self.point()[: self.face.d])[p.outputs[row]]
         return middle + PART * self.reach * rate
 
     def point(self) -> list[arb]:

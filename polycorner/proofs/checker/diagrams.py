@@ -38,7 +38,7 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .arcs import StoredArc, Watched
-from .balls import BITS, NAN, ZERO, NotShownError, dot, hull, need, places, turn
+from .balls import BITS, NAN, ZERO, NotShownError, different, dot, hull, need, places, turn
 from .curves import StoredFace, StoredFamily, Tube
 from .events import StoredEvent, StoredImage
 from .problem import DIAGRAM, StoredProblem, StoredProgram
@@ -47,6 +47,7 @@ from .rationals import decimals
 from .statement import PART
 from .symmetries import StoredSymmetry, TurnedAlgebra
 
+MOST_IMAGES = 100  # symmetries
 MOST_TOLD = 12  # events that are told one by one
 SHRINKINGS = 24  # of a tube about an event, by halves
 
@@ -63,9 +64,11 @@ class StoredDiagram(StoredProof):
         self.family = family = StoredFamily(self.p, data)
         need(all(isinstance(x, str) for x in data["functions"]), "names of functions are texts")
         algebra = TurnedAlgebra(self.p)
+        need(len(data["symmetries"]) <= MOST_IMAGES, "these are too many symmetries")
         images = [StoredImage(family, record, algebra) for record in data["symmetries"]]
         count = len(data["events"])
         need(data["arcs"] and count, "there is no arc, or no event")
+        different([(r["active"], r["points"]) for r in data["arcs"]], "an arc is stated")
         self.arcs = [StoredArc(family, r, f"arc {k}") for k, r in enumerate(data["arcs"])]
         ends: list[list[tuple[StoredArc, int]]] = [[] for _ in range(count)]
         for arc, record in zip(self.arcs, data["arcs"], strict=True):
@@ -125,8 +128,11 @@ class StoredDiagram(StoredProof):
         about = (self.about(*curve) for event in self.events for curve in event.curves)
         for tube in (*(tube for arc in self.arcs for tube in arc.tubes), *about):
             if tube is not None:
-                place = tube.x[: p.n]
-                lower, upper = ([float(end(x)) for x in place] for end in (arb.lower, arb.upper))
+                pairs = list(zip(tube.x, self.family.scales, strict=False))
+                # a tube is tried for boxes that are not farther from it than it is long
+                length = max(float(x.rad() / s) for x, s in pairs)
+                lower = [float(x.lower() - length * s) for x, s in pairs]
+                upper = [float(x.upper() + length * s) for x, s in pairs]
                 self.tubes.setdefault(tube.face.active, []).append((tube, lower, upper))
 
     def about(self, face: StoredFace, x: list[arb], along: list[arb]) -> Tube | None:
