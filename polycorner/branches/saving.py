@@ -10,6 +10,7 @@ test.
 
 import json
 import os
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -35,7 +36,7 @@ from polycorner.proofs.lists.intermediate import directions
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
-SPLIT, CLOSED = 0, -1
+CLOSED = -1  # the code of a leaf, as of a list
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +138,9 @@ def _described(diagram: Diagram, evidence: Evidence) -> dict[str, Any]:
     formulas = Formulas(problem.functions, problem.polyhedron.manifold, names)
     data, _ = stated(problem, formulas, [range(m)])
     _substitute(data, n, evidence)
-    time = diagram.parameter
     data |= {
         "format": DIAGRAM,
-        "coordinates": [*data["coordinates"][:n], time],
+        "coordinates": [*data["coordinates"][:n], diagram.parameter],
         "periods": [*data["periods"][:n], None],
         "parameters": [n],
         "fixed": [],
@@ -209,7 +209,7 @@ def _cover(proof: StoredDiagram, evidence: Evidence, progress: Progress) -> dict
     codes, positions, counts, hints = list[int](), list[float](), list[int](), list[float]()
     p, options = proof.p, evidence.options
     units = np.append(evidence.units[: p.n - 1], (p.upper[-1] - p.lower[-1]) / 5)
-    waiting = [(list(p.lower), list(p.upper))]
+    waiting, started = [(list(p.lower), list(p.upper))], time.monotonic()
     while waiting:
         lo, hi = waiting.pop()
         ways = _closing(proof, evidence, lo, hi)
@@ -220,7 +220,8 @@ def _cover(proof: StoredDiagram, evidence: Evidence, progress: Progress) -> dict
             continue
         widths = (np.array(hi) - lo) / units
         axis = int(widths.argmax())
-        if widths[axis] <= options.resolution or len(codes) >= options.max_boxes:
+        late = time.monotonic() - started > options.max_seconds
+        if late or widths[axis] <= options.resolution or len(codes) >= options.max_boxes:
             names = p.names[:-1]
             where = ", ".join(f"{name} = {x:.6g}" for name, x in zip(names, lo, strict=False))
             found = f"a box near {where}, {p.names[-1]} = {lo[-1]:.6g} that it leaves open"

@@ -20,7 +20,9 @@ positive.__name__ = "positive whole number"  # argparse names the type in its me
 def main(arguments: Sequence[str] | None = None) -> int:
     about = "Check a saved proof: of a minimum, a list of stationary points, or a diagram."
     parser = argparse.ArgumentParser(prog="checker", description=about)
-    parser.add_argument("file", help="a file written by Proof.save, StationaryList.save or BranchProof.save")
+    parser.add_argument(
+        "file", help="a file written by Proof.save, StationaryList.save or BranchProof.save"
+    )
     parser.add_argument(
         "--sample", type=positive, metavar="K", help="check K leaves drawn at random, not all"
     )

@@ -30,6 +30,7 @@ from .statement import PART, SLACK, approach, zero_near
 OVERLAP = arb(0.125)  # of a tube beyond its ends, as a part of the way between them
 MOST_UNKNOWNS = 200
 INFLATIONS, GROWTH = 6, arb(1.3)  # of the box in which solutions are alone
+GAIN = 0.7  # ratio of sides with which a box is narrowed again
 
 Equations = Callable[[Sequence[arb]], tuple[list[arb], list[list[arb]]]]
 
@@ -248,6 +249,31 @@ class Tube:
         axis = [c + t * delta for c, t in zip(self.centre, self.tangent, strict=True)]
         apart = zip(self.alone, x, axis, strict=True)
         return bool(abs(delta) <= self.reach) and all(w.contains(a - b) for w, a, b in apart)
+
+    def narrowed(self, x: list[arb], steps: int) -> list[arb]:
+        """Enclose the solutions in a box of unknowns more closely; empty if there are none.
+
+        For any matrix ``Y`` and a point ``m`` of the box they are in ``m - Y F(m) + (I - Y J) (X
+        - m)``, the pin being at the values of ``delta`` that the box has.
+        """
+        unit = arb_mat(self.face.size, self.face.size, 1)
+        for _ in range(steps):
+            middle = [y.mid() for y in x]
+            try:
+                values, rows = self.face.at(middle)[0], self.derivatives(x)
+            except NotShownError:
+                return x
+            away = arb_mat([[a - b] for a, b in zip(x, middle, strict=True)])
+            pin = -dot(self.normal, away.entries())
+            moved = (unit - self.backwards * arb_mat(rows)) * away
+            moved -= self.backwards * arb_mat([[y] for y in (*values, pin)])
+            new = [a + b for a, b in zip(middle, moved.entries(), strict=True)]
+            if not all(a.overlaps(b) for a, b in zip(x, new, strict=True)):
+                return []
+            old, x = x, [a.intersection(b) for a, b in zip(x, new, strict=True)]
+            if all(a.rad() > GAIN * b.rad() for a, b in zip(x, old, strict=True)):
+                break
+        return x
 
     def covers(self, x: Sequence[arb]) -> bool:
         """Whether all solutions in a box are on the curve, which may be farther away.

@@ -49,6 +49,7 @@ from .symmetries import StoredSymmetry, TurnedAlgebra
 
 MOST_IMAGES = 100  # symmetries
 MOST_TOLD = 12  # events that are told one by one
+NARROWINGS = 4  # of a box, towards a curve
 SHRINKINGS = 24  # of a tube about an event, by halves
 
 
@@ -191,34 +192,54 @@ class StoredDiagram(StoredProof):
         left = [a for a in some if not any(other.issuperset(a) for other in grown)]
         if not all(a in self.tubes for a in left):
             return False
+        rows = [*u, *range(self.p.m, self.p.m + self.p.k + 1)]
         try:
-            self.family.forms(box, [*u, *range(self.p.m, self.p.m + self.p.k + 1)])
-            return all(self.on_curves(a, box) for a in left)
+            _, _, found = self.family.forms(box, rows)
+            slopes = {row: gradient for row, (_, gradient, _) in zip(rows, found, strict=True)}
+            return all(self.on_curves(a, box, slopes) for a in left)
         except NotShownError:
             return False
 
-    def on_curves(self, active: tuple[int, ...], box: list[arb]) -> bool:
+    def on_curves(self, active: tuple[int, ...], box: list[arb], slopes: dict[int, Any]) -> bool:
         """Whether all solutions of the equations of a face in a box are on curves of tubes."""
         face = self.faces.setdefault(active, StoredFace(self.family, active))
-        mu = self.multipliers(face, box)
+        mu = self.multipliers(face, slopes)
         if mu is not None and not mu:
             return True
-        for tube, lower, upper in self.tubes[active] if mu else ():
-            moved = [
-                x + turn(x, a, b, period)
-                for x, a, b, period in zip(box, lower, upper, self.p.periods, strict=True)
-            ]
-            ends = zip(moved, lower, upper, strict=True)
-            if not any(x < a or x > b for x, a, b in ends) and tube.covers([*moved, *(mu or ())]):
-                return True
-        return False
+        near = sorted(self.near(active, box), key=lambda found: found[0]) if mu else []
+        if not near:
+            return False
+        left = near[0][1].narrowed([*near[0][2], *(mu or ())], NARROWINGS)
+        return not left or any(
+            tube.covers([*self.turned(left, lower, upper), *left[self.p.n :]])
+            for _, tube, _, lower, upper in near
+        )
+
+    def near(self, active: tuple[int, ...], box: list[arb]) -> Iterator[Any]:
+        """Yield the tubes of a face that are near a box: the distance, the tube, the box there."""
+        for k, (tube, lower, upper) in enumerate(self.tubes[active]):
+            x = self.turned(box, lower, upper)
+            if not any(y < a or y > b for y, a, b in zip(x, lower, upper, strict=True)):
+                apart = zip(x, tube.centre, self.family.scales, strict=False)
+                yield (
+                    (max(float(abs(y - z).mid() / s) for y, z, s in apart), k),
+                    tube,
+                    x,
+                    lower,
+                    upper,
+                )
+
+    def turned(self, box: Sequence[arb], lower: list[float], upper: list[float]) -> list[arb]:
+        """Return a box with whole turns added, to where it is nearest to another."""
+        ends = zip(box, lower, upper, self.p.periods, strict=False)
+        return [y + turn(y, a, b, period) for y, a, b, period in ends]
 
     @staticmethod
-    def multipliers(face: StoredFace, box: list[arb]) -> list[arb] | None:
+    def multipliers(face: StoredFace, slopes: dict[int, Any]) -> list[arb] | None:
         """Enclose multipliers of sum 1 in a box; empty if there are none, None if not bounded."""
-        n, d = face.n, face.d
-        _, jacobian = face.at([*box, *[ZERO] * len(face.rows)])
-        rows = arb_mat([row[d:] for row in (*jacobian[:n], jacobian[-1])])
+        n, pairs = face.n, list(zip(face.signed, face.rows, strict=True))
+        table = [[s * slopes[row].get(i, ZERO) for s, row in pairs] for i in range(n)]
+        rows = arb_mat([*table, face.counted])
         right = arb_mat([[ZERO]] * n + [[arb(1)]])
         unit = [ZERO.union(arb(1)) if c == 1 else None for c in face.counted]
         try:
