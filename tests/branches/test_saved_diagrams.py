@@ -18,6 +18,7 @@ from itertools import combinations
 from math import pi
 from pathlib import Path
 
+import commands
 import flint
 import pytest
 import sympy
@@ -399,7 +400,7 @@ def test_a_box_is_covered_by_its_parts(saved, tmp_path):
         {"tree.bin": tree.replace(b"\xff", b"\xfe", 1)}, {"tree.bin": b"\x05" + tree[1:]},
         {"positions.bin": places[:-8]}, {"positions.bin": places + places[-8:]},
         {"positions.bin": places[8:16] + places[8:]}, {"counts.bin": counts[:-2]},
-        {"counts.bin": bytes(len(counts))}, {"directions.bin": b""},
+        {"counts.bin": b"\x01" + counts[1:]}, {"directions.bin": bytes(8)},
     ]  # fmt: skip
     for change in wrong:
         assert not verdict(write(tmp_path / "wrong.zip", parts | change))[0], change
@@ -415,6 +416,18 @@ def test_a_box_is_covered_by_its_parts(saved, tmp_path):
                 assert f"{factor * z}" in line
     missing = {name: content for name, content in parts.items() if name != "tree.bin"}
     assert not verdict(write(tmp_path / "missing.zip", missing))[0]
+
+
+def test_the_command_says_what_is_verified(saved, tmp_path, capsys):
+    code, out, _ = commands.run(capsys, "verify", str(saved("fold", False)))
+    assert code == 0
+    assert out.startswith("verified: equilibria over t from -1.0 to 1.0, 2 arcs (1 of index 0, 1")
+    parts, data = parts_of(saved("fold", False)), described(saved("fold", False))
+    data["events"].pop()
+    path = rewritten(tmp_path / "less.zip", parts, data)
+    code, out, _ = commands.run(capsys, "verify", str(path))
+    assert code == 1
+    assert out.startswith("NOT VERIFIED: ")
 
 
 def test_a_sample_is_said_to_be_one(saved):

@@ -117,7 +117,7 @@ class StoredArc:
         last = self.tubes[-1]
         x = zero_near(self.face.pinned(last.normal, at), at)
         need(last.contains(x) and tube.contains(x), "two tubes are not shown to have one curve")
-        onwards = dot(tube.normal, last.velocity)
+        onwards = dot(tube.normal, last.velocity_at(x))
         need(onwards > 0, "the curve is not shown to go on in one direction")
         return [x]
 

@@ -302,6 +302,10 @@ class Tube:
             self._velocity = solved(self.rows, [*[ZERO] * (self.face.size - 1), arb(1)])
         return self._velocity
 
+    def velocity_at(self, x: Sequence[arb]) -> list[arb]:
+        """Enclose the velocity at a point of the curve, by the pin of this tube."""
+        return solved(self.derivatives(x), [*[ZERO] * (self.face.size - 1), arb(1)])
+
     def acceleration(self) -> list[arb]:
         """Enclose the second derivatives of the unknowns by ``delta``."""
         bend = self.face.second(self.x, self.velocity)

@@ -34,7 +34,7 @@ from flint import arb, arb_mat
 
 from .algebra import total
 from .arcs import StoredArc, Watched
-from .balls import ZERO, NotShownError, need, negatives, places
+from .balls import ZERO, NotShownError, dot, need, negatives, places
 from .curves import StoredFace, StoredFamily, Tube, solved
 from .statement import zero_near
 from .symmetries import TurnedAlgebra
@@ -100,9 +100,7 @@ class StoredEvent:
         onwards = []
         for arc, _ in self.ends:
             arc.close(side, tube.x)
-            rows, size = arc.end(side).derivatives(tube.x), tube.face.size
-            velocity = solved(rows, [*[ZERO] * (size - 1), arb(1)])
-            onwards.append(sum((a * b for a, b in zip(tube.normal, velocity, strict=True)), ZERO))
+            onwards.append(dot(tube.normal, arc.end(side).velocity_at(tube.x)))
         need(onwards[0] * onwards[1] < 0, "the two arcs are not shown to be two sides of the curve")
         return tube.x[: tube.face.d], "fold"
 
@@ -118,7 +116,7 @@ class StoredEvent:
                     tube = Tube.about(face, x, along, reach)
                     rate = tube.acceleration()[face.n]
                     there = tube.point()
-                    now = solved(tube.derivatives(there), [*[ZERO] * (face.size - 1), arb(1)])
+                    now = tube.velocity_at(there)
                     need(rate > 0 or rate < 0, "the parameter is not shown to turn back once")
                     delta = -now[face.n] / rate
                     need(abs(delta) < reach, "the parameter is not shown to turn back")
