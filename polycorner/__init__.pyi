@@ -12,7 +12,7 @@ from .minimisation import (
     sensitivity,
     stationary_on,
 )
-from .motion import Friction, State, System, Trajectory, simulate, velocities
+from .motion import Drift, Friction, State, System, Trajectory, simulate, velocities
 from .polyhedra import AllOf, AnyOf, Polyhedron, Stratum, Symmetry, stratum_at
 from .proofs import Membership, Proof, exact_point, prove
 from .skeletons import Skeleton, skeleton
@@ -23,6 +23,7 @@ __all__ = [
     "AllOf",
     "AnyOf",
     "Certificate",
+    "Drift",
     "Entrapment",
     "Friction",
     "Manifold",

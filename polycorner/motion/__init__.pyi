@@ -11,6 +11,7 @@ from .contacts import (
     time_symbol,
     velocities,
 )
+from .drifts import Drift
 from .events import Event, EventKind
 from .friction import ConvexPolygon, ConvexSet, CutDisc, Disc, Ellipse, Interval
 from .mechanics import MechanicalSystem, State
@@ -19,6 +20,7 @@ from .random_functions import random_field, random_signal
 from .rotations import angular_velocity, rotational_energy
 from .scenes import ContactForce, ContactForces
 from .simulation import simulate, step
+from .splits import Split
 from .system import System
 from .ties import Tie
 from .trajectory import MotionOfKind, Trajectory, contact_forces
@@ -35,6 +37,7 @@ __all__ = [
     "ConvexSet",
     "CutDisc",
     "Disc",
+    "Drift",
     "Ellipse",
     "Event",
     "EventKind",
@@ -46,6 +49,7 @@ __all__ = [
     "Noise",
     "PairFriction",
     "Solver",
+    "Split",
     "State",
     "System",
     "Tie",

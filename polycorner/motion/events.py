@@ -22,6 +22,7 @@ class EventKind(IntEnum):
     MOTION = 4
     EXIT = 5
     FAILED = 6
+    SPLIT = 7
 
     @property
     def sentence(self) -> str:
@@ -37,6 +38,7 @@ _SENTENCES = {
     EventKind.MOTION: "a body began to move",
     EventKind.EXIT: "a body left",
     EventKind.FAILED: "a contact was not solved to the tolerance, in however short a step",
+    EventKind.SPLIT: "a concave corner was met, beyond which the motion has several continuations",
 }
 
 

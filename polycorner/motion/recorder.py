@@ -31,6 +31,7 @@ from polycorner.motion.events import EventKind, EventTable, joined
 from polycorner.motion.scenes import FrictionTable, friction_table
 from polycorner.motion.tables import read_events, read_friction, read_touches
 from polycorner.motion.trajectory import Touch, Trajectory
+from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -254,12 +255,25 @@ class Recorder:
 
     def trajectory(self, system: "MechanicalSystem", **run: Any) -> Trajectory:
         """Return what was recorded; ``run`` are the arguments of the simulation."""
-        bodies, columns = self.engine.bodies, self.columns
-        touching = [[t for t in some if t[1] not in system.hidden] for some in self.touching]
-        sums, energies = np.array(columns["sums"]), np.array(columns["energies"])
+        bodies, sums = self.engine.bodies, np.array(self.columns["sums"])
         work = {name: sums[:, i] for name, i in WORK.items()}
         if any(kind.body.timed for kind in bodies.kinds) or bodies.ties.drives:
             work["drive"] = sums[:, DRIVE_WORK]
+        dissipated = {cause: sums[:, DISSIPATED + i] for i, cause in enumerate(bodies.causes)}
+        deepest = float(self.engine.motion.sums[PENETRATION])
+        return self._trajectory(system, dissipated, work, deepest, **run)
+
+    def _trajectory(
+        self,
+        system: "MechanicalSystem",
+        dissipated: "Mapping[str, Array]",
+        work: dict[str, Array],
+        deepest: float,
+        **run: Any,
+    ) -> Trajectory:
+        bodies, columns = self.engine.bodies, self.columns
+        touching = [[t for t in some if t[1] not in system.hidden] for some in self.touching]
+        energies = np.array(columns["energies"])
         if any(kind.exit_coordinate >= 0 for kind in bodies.kinds):
             work["left"] = np.array(self.left)
         return Trajectory(
@@ -274,10 +288,10 @@ class Recorder:
             friction=friction_table(self.friction),
             kinetic=energies[:, 0],
             potential=energies[:, 1],
-            dissipated={cause: sums[:, DISSIPATED + i] for i, cause in enumerate(bodies.causes)},
+            dissipated=dissipated,
             work=work,
             events=joined(self.events, bodies.contact_names).in_time(),
-            max_penetration=float(self.engine.motion.sums[PENETRATION]),
+            max_penetration=deepest,
             effort=self.engine.effort,
             **run,
         )

@@ -69,6 +69,7 @@ from polycorner.errors import SolverError
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
 from polycorner.motion.bodies import IdenticalBodies, MovingBodies
+from polycorner.motion.drifts import Drift
 from polycorner.motion.formulation import mass_and_forces
 from polycorner.motion.mechanics import MechanicalSystem, Memory, State
 from polycorner.motion.noise import OPTIONS, Noise, Solver
@@ -80,6 +81,7 @@ if TYPE_CHECKING:
     from polycorner.motion.checkpoints import Checkpoint, SavedRun
     from polycorner.motion.engine.driver import Engine
     from polycorner.motion.recorder import Recorder
+    from polycorner.motion.sweeping.driver import DriftEngine
     from polycorner.motion.trajectory import Trajectory
 
 FRAMES = 1000  # instants recorded by default
@@ -152,7 +154,6 @@ def simulate(
     (2, 0.452)
     """
     from polycorner.motion.checkpoints import SavedRun
-    from polycorner.motion.recorder import Recorder
 
     noise = Noise() if noise is None else instance("noise", noise, Noise)
     solver = system_solver(system) if solver is None else instance("solver", solver, Solver)
@@ -161,7 +162,7 @@ def simulate(
     steps, step = _steps(end - state.time, real("dt", dt, above=0, unit="s"))
     engine = start(system, state, step, noise=noise, solver=solver)
     stride = max(1, steps // FRAMES) if every is None else whole("every", every, least=1)
-    recorder, saved = Recorder(engine), None
+    recorder, saved = _recorder(engine), None
     if checkpoint is not None:
         told = _parameters(system, state, end, dt, stride, noise, solver)
         told |= {"steps before": engine.before} if engine.before else {}
@@ -179,6 +180,15 @@ def simulate(
     last = replace(_present(engine, state), memory=memory)
     run = {"noise": noise, "solver": solver, "every": stride, "t_end": end, "last": last}
     return recorder.trajectory(system, **run, steps_per_second=rate)
+
+
+def _recorder(engine: Any) -> "Recorder":
+    """Return what records an engine."""
+    from polycorner.motion.drift_recorder import DriftRecorder
+    from polycorner.motion.recorder import Recorder
+    from polycorner.motion.sweeping.driver import DriftEngine
+
+    return DriftRecorder(engine) if isinstance(engine, DriftEngine) else Recorder(engine)
 
 
 def _steps(duration: float, dt: float) -> tuple[int, float]:
@@ -304,7 +314,8 @@ def start(
     real("dt", dt, least=SHORTEST_STEP, unit="s")
     placed = bodies.padded(state.q), bodies.padded(state.v)
     bodies.check_places(*placed, dt)
-    _check_mass(bodies, *placed)
+    if not isinstance(system, Drift):
+        _check_mass(bodies, *placed)
     memory = state.memory if _goes_on(system, state, dt) else None
     if memory is None:  # what goes on was let in; bodies that have left stand where others may be
         system.check_placement(state.q)
@@ -313,6 +324,8 @@ def start(
             msg = f"dt: expected at most {largest:.3g} s, {why}; got {dt}"
             raise ValueError(msg)
     noise = Noise() if noise is None else instance("noise", noise, Noise)
+    if isinstance(system, Drift):
+        return _start_drift(system, placed[0], state, dt, noise, solver, memory)
     every = [name for kind in bodies.kinds for name in kind.body.formulation.coordinates]
     names("kicks", noise.kicks, list(dict.fromkeys(every)))
     if noise.kicks and noise.kick_time:
@@ -323,6 +336,28 @@ def start(
         bodies = replace(bodies, body=paced)
     begun = state.time if memory is None else memory.start
     engine = Engine(bodies, *placed, state.sticking, dt, start=begun, noise=noise, solver=solver)
+    if memory is not None:
+        engine.resume(memory.arrays)
+    return engine
+
+
+def _start_drift(
+    drift: Drift,
+    q: Array,
+    state: State,
+    dt: float,
+    noise: Noise,
+    solver: Solver,
+    memory: Memory | None,
+) -> "DriftEngine":
+    """Return the engine of first-order motion."""
+    from polycorner.motion.sweeping.driver import DriftEngine
+
+    if noise.chatter or noise.kicks:
+        expected = "a seed alone for a Drift, whose noise is its own"
+        refuse("noise", expected, noise, TypeError)
+    begun = state.time if memory is None else memory.start
+    engine = DriftEngine(drift, q, dt, start=begun, noise=noise, solver=solver)
     if memory is not None:
         engine.resume(memory.arrays)
     return engine

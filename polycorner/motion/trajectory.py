@@ -18,6 +18,7 @@ from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import Noise, Solver
 from polycorner.motion.placements import onto_equations
 from polycorner.motion.scenes import ContactForce, ContactForces, FrictionTable
+from polycorner.motion.splits import Split
 from polycorner.motion.system import System
 from polycorner.printing import Printed, Sheet, Table, facts, listed, names, number, titled
 from polycorner.spaces.manifold import Array
@@ -126,6 +127,7 @@ class Trajectory(Checked, Printed):
     steps_per_second: float = math.nan
     friction: FrictionTable = field(default_factory=FrictionTable)
     last: State | None = None
+    splits: tuple[Split, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of recorded instants."""
