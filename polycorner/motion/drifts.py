@@ -23,7 +23,7 @@ from polycorner.motion.contacts import (
 from polycorner.motion.formulation import TIME, Formulation, Laws, degree
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.mechanics import MechanicalSystem, State
-from polycorner.motion.noise import OPTIONS, Solver
+from polycorner.motion.noise import OPTIONS, MotionOptions, Solver
 from polycorner.motion.placements import check_contacts, check_equations, gap_unit
 from polycorner.motion.scenes import Scene, overlapping
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -34,6 +34,8 @@ from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     import sympy
+
+CROWD = Solver(1e-5, options=MotionOptions(zero_gap=1e-7, touching=1e-6, parting=1e-4))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,8 +177,11 @@ class Drift(MechanicalSystem, Printed):
 
     @property
     def solver(self) -> Solver:
-        """How exactly steps are solved unless something else is asked for."""
-        return Solver()
+        """How exactly steps are solved unless something else is asked for.
+
+        Where bodies touch each other, gaps hold to 1e-7 of the unit of length instead of 1e-9.
+        """
+        return CROWD if self.bodies.families else Solver()
 
     # ------------------------------------------------------------------------------- compiled laws
 

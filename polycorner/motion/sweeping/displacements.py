@@ -196,6 +196,8 @@ def correct(s, st, w, low, high, t, h, count):
             return count, left, True
         left = solve(s, st, w, low, high, count, tolerance)
         st.counts[CORRECTIONS] += 1
+        if not left <= 2.0 * tolerance:
+            break
     return count, left, False
 
 

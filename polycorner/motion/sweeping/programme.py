@@ -6,9 +6,8 @@ Of all displacements ``d`` with ``J d + c >= 0``, and ``= 0`` for equations, fin
 ``0 <= lam  perp  J d + c >= 0``,
 
 which are the optimality conditions of ``min lam' J B J' lam / 2 + (J d_0 + c)' lam`` over
-``lam >= 0``.  Sweeps of projected Gauss and Seidel find the rows that act, and conjugate gradients
-on these rows solve what is left, up to the first force that vanishes; neither ever increases the
-function ([MT91]).  What is left of the conditions is measured after each round.
+``lam >= 0``.  Sweeps of projected Gauss and Seidel and conjugate gradients with proportioning take
+turns; neither ever increases the function.  What is left of the conditions is measured.
 """
 
 import numpy as np
@@ -17,9 +16,12 @@ from polycorner.formulas.compilation import never_inline
 from polycorner.motion.sweeping.draws import compiled
 from polycorner.motion.sweeping.records import SWEEPS
 
-ROUND = 4  # sweeps between two solutions on the rows that act
-SHARE = 0.1  # of the tolerance, to which these are solved
-IDLE, HELD, ACTS = range(3)  # whether a row belongs to the programme, and whether it acts
+ROUND, STRETCH = 4, 200  # sweeps, and steps of gradients, in turn
+CHECKED = 5  # steps of gradients between two looks at what is left
+POWERS, MARGIN = 8, 1.1  # of the matrix, whose largest eigenvalue is a little above what they tell
+PACE = 1.9  # length of a step of fixed length, over that eigenvalue: less than 2
+STRIDE = 3  # its place in the work
+IDLE, HELD = range(2)  # whether a row belongs to the programme
 
 
 @compiled
@@ -109,66 +111,167 @@ def residual(s, w, count):
 
 
 @compiled
-def descend(s, w, low, high, count, tolerance):
-    """Take conjugate gradients on the rows that act, up to the first force that vanishes."""
-    never_inline()
-    k, product = s.k, 0.0
+def apply(s, w, low, high, count, x, product):
+    """Multiply numbers of rows by the matrix ``J B J'`` of the programme, scaled to a diagonal of 1.
+
+    ``w.step`` is the displacement that belongs to them.
+    """
+    for i in range(low, high):
+        for c in range(s.k):
+            w.step[i, c] = 0.0
     for e in range(count):
         r = w.active[e]
-        acts = w.size[r] > 0.0 and (w.force[r] > 0.0 or is_equation(s, r))
-        w.listed[r], w.course[r] = (ACTS if acts else HELD), 0.0
-        if acts:
-            w.slope[r] = -(along(s, w, r, w.d) + w.shift[r])
-            w.course[r] = w.slope[r] / w.size[r]
-            product += w.slope[r] * w.course[r]
-    for _ in range(count):
-        if not product > 0.0:
-            return
-        for i in range(low, high):
-            for c in range(k):
-                w.step[i, c] = 0.0
+        if x[r] != 0.0:
+            push(s, w, r, x[r] / np.sqrt(w.size[r]), w.step)
+    for e in range(count):
+        r = w.active[e]
+        if w.size[r] > 0.0:
+            product[r] = along(s, w, r, w.step) / np.sqrt(w.size[r])
+
+
+@compiled
+def spread(s, w, low, high, count):
+    """Return an upper estimate of the largest eigenvalue of the matrix, by its powers."""
+    for e in range(count):
+        r = w.active[e]
+        w.course[r] = 1.0 if w.size[r] > 0.0 else 0.0
+    largest = 1.0
+    for _ in range(POWERS):
+        apply(s, w, low, high, count, w.course, w.change)
+        size = before = 0.0
         for e in range(count):
             r = w.active[e]
-            if w.listed[r] == ACTS:
-                push(s, w, r, w.course[r], w.step)
-        bent = 0.0
+            size += w.change[r] * w.change[r] if w.size[r] > 0.0 else 0.0
+            before += w.course[r] * w.course[r]
+        if not size > 0.0 or not before > 0.0:
+            return largest
+        largest = max(largest, np.sqrt(size / before))
         for e in range(count):
             r = w.active[e]
-            if w.listed[r] == ACTS:
-                bent += w.course[r] * along(s, w, r, w.step)
+            w.course[r] = w.change[r] / np.sqrt(size) if w.size[r] > 0.0 else 0.0
+    return MARGIN * largest
+
+
+@compiled
+def slopes(s, w, low, high, count, fresh):
+    """Set the slopes of the function by scaled forces; return three products that tell how to go.
+
+    Those are the squares of the slopes that a force of zero may follow, and of those that positive
+    forces may follow, these by what is left of the forces.
+    """
+    bound = free = left = 0.0
+    for e in range(count):
+        r = w.active[e]
+        if not w.size[r] > 0.0:
+            continue
+        root = np.sqrt(w.size[r])
+        if fresh:
+            w.slope[r] = (along(s, w, r, w.d) + w.shift[r]) / root
+        slope, force = w.slope[r], w.force[r] * root
+        if is_equation(s, r) or force > 0.0:
+            free += slope * slope
+            kept = slope if is_equation(s, r) else min(slope, force / w.room[STRIDE])
+            left += slope * kept
+        elif slope < 0.0:
+            bound += slope * slope
+    return bound, free, left
+
+
+@compiled
+def head(s, w, count, zero):
+    """Let the course follow the slopes of forces that are positive, or, if told so, of zero ones."""
+    for e in range(count):
+        r = w.active[e]
+        w.course[r] = 0.0
+        if w.size[r] > 0.0:
+            free = is_equation(s, r) or w.force[r] > 0.0
+            if (not zero and free) or (zero and not free and w.slope[r] < 0.0):
+                w.course[r] = w.slope[r]
+
+
+@compiled
+def move(s, w, low, high, count, length):
+    """Change forces, slopes and displacements along the course, against it."""
+    for e in range(count):
+        r = w.active[e]
+        if w.size[r] > 0.0:
+            w.force[r] -= length * w.course[r] / np.sqrt(w.size[r])
+            w.slope[r] -= length * w.change[r]
+            if not is_equation(s, r):
+                w.force[r] = max(0.0, w.force[r])
+    for i in range(low, high):
+        for c in range(s.k):
+            w.d[i, c] -= length * w.step[i, c]
+
+
+@compiled
+def expand(s, w, count):
+    """Change forces by a step of fixed length along the slopes, those that reach zero stay there."""
+    for e in range(count):
+        r = w.active[e]
+        if w.size[r] > 0.0 and (is_equation(s, r) or w.force[r] > 0.0):
+            force = w.force[r] - w.room[STRIDE] * w.slope[r] / np.sqrt(w.size[r])
+            if not is_equation(s, r):
+                force = max(0.0, force)
+            push(s, w, r, force - w.force[r], w.d)
+            w.force[r] = force
+
+
+@compiled
+def descend(s, w, low, high, count, tolerance, steps):
+    """Take steps of conjugate gradients with proportioning ([Dostal]); return how many.
+
+    Gradients on the positive forces as long as those of the others are small beside them, and one
+    step along the others where they are not.  A step that would make forces negative ends where the
+    first vanishes, and one of fixed length along the slopes follows.
+    """
+    never_inline()
+    w.room[STRIDE] = PACE / spread(s, w, low, high, count)
+    bound, free, left = slopes(s, w, low, high, count, True)
+    head(s, w, count, False)
+    for done in range(steps):
+        if done % CHECKED == 0 and residual(s, w, count) <= tolerance:
+            return done
+        zero = bound > left
+        if zero:
+            head(s, w, count, True)
+        apply(s, w, low, high, count, w.course, w.change)
+        bent = down = 0.0
+        for e in range(count):
+            r = w.active[e]
+            if w.size[r] > 0.0:
+                bent += w.course[r] * w.change[r]
+                down += w.course[r] * w.slope[r]
         if not bent > 0.0:
-            return
-        length, blocked = product / bent, -1
+            if not down > 0.0:
+                return done
+            bent = 0.0
+        length, most = (down / bent if bent > 0.0 else np.inf), np.inf
         for e in range(count):
             r = w.active[e]
-            falls = w.listed[r] == ACTS and not is_equation(s, r)
-            if falls and w.force[r] + length * w.course[r] < 0.0:
-                length, blocked = -w.force[r] / w.course[r], r
+            if w.size[r] > 0.0 and w.course[r] > 0.0 and not is_equation(s, r):
+                most = min(most, w.force[r] * np.sqrt(w.size[r]) / w.course[r])
+        if min(length, most) == np.inf:
+            return done
+        move(s, w, low, high, count, min(length, most))
+        if zero or length > most:
+            if length > most:
+                expand(s, w, count)
+            bound, free, left = slopes(s, w, low, high, count, True)
+            head(s, w, count, False)
+            continue
+        bound, free, left = slopes(s, w, low, high, count, False)
+        turn = 0.0
         for e in range(count):
             r = w.active[e]
-            if w.listed[r] == ACTS:
-                w.force[r] += length * w.course[r]
-                if not is_equation(s, r):
-                    w.force[r] = max(0.0, w.force[r])
-        for i in range(low, high):
-            for c in range(k):
-                w.d[i, c] += length * w.step[i, c]
-        if blocked >= 0:
-            w.force[blocked] = 0.0
-            return
-        former, product, worst = product, 0.0, 0.0
+            if w.size[r] > 0.0 and (is_equation(s, r) or w.force[r] > 0.0):
+                turn += w.slope[r] * w.change[r]
         for e in range(count):
             r = w.active[e]
-            if w.listed[r] == ACTS:
-                w.slope[r] -= length * along(s, w, r, w.step)
-                product += w.slope[r] * w.slope[r] / w.size[r]
-                worst = max(worst, abs(w.slope[r]) / w.norm[r])
-        if worst <= tolerance:
-            return
-        for e in range(count):
-            r = w.active[e]
-            if w.listed[r] == ACTS:
-                w.course[r] = w.slope[r] / w.size[r] + product / former * w.course[r]
+            if w.size[r] > 0.0:
+                free_row = is_equation(s, r) or w.force[r] > 0.0
+                w.course[r] = (w.slope[r] if free_row else 0.0) - turn / bent * w.course[r]
+    return steps
 
 
 @compiled
@@ -193,6 +296,9 @@ def solve(s, st, w, low, high, count, tolerance):
         left = residual(s, w, count)
         if left <= tolerance or not left < np.inf:
             break
-        descend(s, w, low, high, count, SHARE * tolerance)
+        done += descend(s, w, low, high, count, tolerance, min(STRETCH, s.sweeps - done))
+        left = residual(s, w, count)
+        if left <= tolerance:
+            break
     st.counts[SWEEPS] += done
     return left

@@ -91,6 +91,7 @@ WORK = Layout.of(
     active="whole R",
     slope="real R",
     course="real R",
+    change="real R",
     mobility="real N k k",
     metric="real N k k",
     factor="real N k k",
@@ -110,7 +111,7 @@ WORK = Layout.of(
     order="whole N",
     along="real N",
     status="whole 4",  # pairs in the list, whether there is one, bodies that were split, and where
-    room="real 3",  # of the list of neighbours; where a corner was met, as a part of the step
+    room="real 4",  # of the list of neighbours; where a corner was met, as a part of the step
     # (the third is what contacts of hulls are told: gradients of all gaps are asked for)
     meeting="whole *",  # pieces that meet there
     buffer="real *",
