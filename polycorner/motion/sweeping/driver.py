@@ -84,10 +84,10 @@ class DriftEngine:
     @property
     def motion(self) -> SimpleNamespace:
         """The present state, as what records it reads it."""
-        s, N = self.state, self.bodies.total
+        s = self.state
         return SimpleNamespace(
             q=s["q"], v=self.work["v"], rests=s["rests"], alive=s["alive"], sums=s["sums"],
-            sticks=np.zeros((N, 0), dtype=np.int64),
+            sticks=np.zeros(0, dtype=np.int64),
         )  # fmt: skip
 
     @property
@@ -258,6 +258,8 @@ class DriftEngine:
                 places[k] = state.q.reshape(places[k].shape)
         return {
             **self.state,
+            "v": self.work["v"],
+            "sticks": self.motion.sticks,
             "split_times": np.array([[s.time, s.states[0].time] for s in splits]).reshape(-1, 2),
             "split_bodies": np.array([[s.body, s.taken] for s in splits], np.int64).reshape(-1, 2),
             "split_places": np.array([s.q for s in splits]).reshape(-1, self.bodies.dimension),
@@ -285,7 +287,7 @@ class DriftEngine:
             forms.array(name, saved, "f" if array.dtype == np.float64 else "i", shape)
             array[: len(saved)] = saved
         counts = self.state["counts"]
-        forms.array("counts", counts, "i", least=0)
+        forms.array("counts", counts, "i", counts.shape, least=0)
         if counts[KEPT] > len(arrays["keys"]):
             refuse("counts", f"at most {len(arrays['keys'])} contacts", int(counts[KEPT]))
         self._settle()
