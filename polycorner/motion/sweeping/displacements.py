@@ -129,6 +129,16 @@ def wish_at(s, st, w, x, low, high, t, h):
 
 
 @compiled
+def begin(s, st, w, low, high):
+    """Evaluate functions where bodies are, and what tells how far they are from unions' ends."""
+    evaluate(s, st, w, st.q, low, high, w.before, True)
+    if count_unions(s) > 0:
+        a, b, _, _ = ends_of(s, w, low, high)
+        for r in range(a, b):
+            prepare(s, w, r)
+
+
+@compiled
 def predict(s, st, w, low, high, t, h):
     """Find the displacement to first order, with gradients at the start.
 
@@ -137,7 +147,7 @@ def predict(s, st, w, low, high, t, h):
     never_inline()
     if not wish_at(s, st, w, st.q, low, high, t, h):
         return -1
-    evaluate(s, st, w, st.q, low, high, w.before, True)
+    begin(s, st, w, low, high)
     count = start_rows(s, st, w, low, high)
     for e in range(count):
         r = w.active[e]
@@ -171,10 +181,6 @@ def correct(s, st, w, low, high, t, h, count):
     if not wish_at(s, st, w, w.x, low, high, t + 0.5 * h, h):
         return -1, 0.0, False
     evaluate(s, st, w, w.x, low, high, w.trial, True)
-    if count_unions(s) > 0:
-        a, b, _, _ = ends_of(s, w, low, high)
-        for r in range(a, b):
-            prepare(s, w, r)
     for e in range(count):
         prepare(s, w, w.active[e])
     tolerance, left = tolerance_of(s, st, w, low, high), np.inf

@@ -94,9 +94,12 @@ def choose(s, st, w, i, ask):
     Where several may be chosen, and this is asked for, none is: the body and the union are noted.
     """
     never_inline()
-    found, first = FREE, i * (s.m + s.limits)
+    found, first, far = FREE, i * (s.m + s.limits), 0.0
+    for c in range(s.k):
+        far += abs(w.d[i, c]) * s.units[c]
     for u in range(count_unions(s)):
-        if w.chosen[i, u] >= 0:
+        # What is farther than twice the displacement is not met.
+        if w.chosen[i, u] >= 0 or union_value(s, w, w.before, first, u) > 2.0 * far:
             continue
         part = leaves(s, st, w, i, u)
         if part > 1.0:

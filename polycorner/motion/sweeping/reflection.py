@@ -6,6 +6,7 @@ from polycorner.formulas.compilation import never_inline
 from polycorner.motion.sweeping.accounts import log_event
 from polycorner.motion.sweeping.displacements import (
     CORRECTED,
+    begin,
     ends_of,
     set_ends,
     tolerance_of,
@@ -94,6 +95,8 @@ def project(s, st, w, low, high):
         w.listed[r], w.force[r] = IDLE, 0.0
     for r in range(c, d):
         w.listed[r], w.force[r] = IDLE, 0.0
+    if unions > 0:
+        begin(s, st, w, low, high)
     for i in range(low, high):
         for c_ in range(s.k):
             w.d[i, c_] = w.wish[i, c_]
@@ -110,17 +113,11 @@ def project(s, st, w, low, high):
                 count += 1
     tolerance = tolerance_of(s, st, w, low, high)
     for _ in range(CORRECTED):
+        for i in range(low, high if unions > 0 else low):
+            if st.alive[i]:
+                choose(s, st, w, i, False)
         set_ends(s, st, w, low, high, 1.0)
         evaluate(s, st, w, w.x, low, high, w.trial, True)
-        if unions > 0:
-            for r in range(a, b):
-                prepare(s, w, r)
-            for i in range(low, high):
-                if st.alive[i]:
-                    choose(s, st, w, i, False)
-            evaluate(s, st, w, w.x, low, high, w.trial, False)
-            set_ends(s, st, w, low, high, 1.0)
-            evaluate(s, st, w, w.x, low, high, w.trial, False)
         for e in range(count):
             prepare(s, w, w.active[e])
         count = violated(s, st, w, low, high, count, w.trial, False)
