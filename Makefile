@@ -66,7 +66,7 @@ thorough: .venv/.dev ## all tests, with many more generated inputs
 	@HYPOTHESIS_PROFILE=thorough $(PYTEST) -n auto --dist worksteal
 
 intermediate: .venv/.dev ## intermediate code anew, after a change of what is compiled
-	@for package in measures.chain minimisation.descent proofs.lists motion.engine motion.hulls; do \
+	@for package in measures.chain minimisation.descent proofs.lists motion.engine motion.hulls motion.sweeping; do \
 	    .venv/bin/python -m polycorner.$$package.intermediate || exit; done
 
 lint: .venv/.dev ## ruff: rules and format

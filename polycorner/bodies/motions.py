@@ -16,6 +16,7 @@ from polycorner.bodies.poses import Placement
 from polycorner.bodies.shapes import Body, Part
 from polycorner.bodies.walls import HalfSpace, Wall
 from polycorner.checks import instance, reals, refuse
+from polycorner.motion.drifts import Drift
 from polycorner.motion.system import System
 from polycorner.motion.trajectory import Touch, Trajectory
 from polycorner.spaces.arguments import finite
@@ -206,7 +207,7 @@ def poses_of(arrangement: Any, motion: Any, argument: str = "motion") -> Poses:
 
 def _moving(argument: str, arrangement: Arrangement, path: Trajectory) -> Poses:
     system: Any = path.system
-    if isinstance(system, System):
+    if isinstance(system, System | Drift):
         known, own = system.manifold.names, arrangement.manifold.names
         if known != own:
             refuse(argument, f"one of the coordinates {', '.join(own)}", ", ".join(known))

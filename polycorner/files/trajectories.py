@@ -33,6 +33,7 @@ from polycorner.kinds import checked
 from polycorner.motion.assembly import Assembly
 from polycorner.motion.bodies import IMPACT_LAWS
 from polycorner.motion.contacts import ContactFamily
+from polycorner.motion.drifts import Drift
 from polycorner.motion.hulls.contacts import HullContacts
 from polycorner.motion.system import System
 from polycorner.motion.tables import read_touches
@@ -42,6 +43,7 @@ from polycorner.motion.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
+Moving = System | Assembly | Drift
 KIND = FileKind("trajectory", "save_trajectory", BINARY)
 OTHERS = ("time", "energy", "force", "impulse", "gap")
 NOT_STATED = "not stated"
@@ -108,9 +110,9 @@ def trajectory_dataset(
     )
 
 
-def _kinds(system: System | Assembly) -> list[tuple[str, System]]:
+def _kinds(system: Moving) -> list[tuple[str, System | Drift]]:
     """Return the kinds of bodies, and how the names of their variables end."""
-    if isinstance(system, System):
+    if not isinstance(system, Assembly):
         return [("", system)]
     return [(f"_{name}", kind) for name, kind in system.kinds.items()]
 
@@ -154,7 +156,7 @@ def save_trajectory(
 
 
 @checked
-def load_trajectory(path: str | os.PathLike[str], system: System | Assembly) -> Trajectory:
+def load_trajectory(path: str | os.PathLike[str], system: Moving) -> Trajectory:
     """Read the trajectory of a system back.
 
     The system must be that of the file: coordinates with periods and scales, energies, forces,
@@ -164,7 +166,7 @@ def load_trajectory(path: str | os.PathLike[str], system: System | Assembly) -> 
     ----------
     path : path
         A file that :func:`save_trajectory` wrote.
-    system : System or Assembly
+    system : System, Assembly or Drift
         The system that moved.
 
     Returns
@@ -177,7 +179,7 @@ def load_trajectory(path: str | os.PathLike[str], system: System | Assembly) -> 
         If the file is no trajectory, was changed, or is of another system, naming the first
         difference.
     """
-    if not isinstance(system, Assembly):
+    if not isinstance(system, Assembly | Drift):
         instance("system", system, System)
     found = load_dataset(KIND, path, lambda content: _read(content, system))
     if isinstance(found, str):
@@ -229,7 +231,7 @@ def _read_poses(content: "xr.Dataset") -> Poses | None:
     return recorded(arrangement, times, *both, present, touching)
 
 
-def _arrangement(arrangement: Arrangement, system: System | Assembly) -> dict[str, str]:
+def _arrangement(arrangement: Arrangement, system: Moving) -> dict[str, str]:
     own = instance("arrangement", arrangement, Arrangement)
     known = tuple(name for _, kind in _kinds(system) for name in kind.manifold.names)
     if own.manifold.names != known:
@@ -237,11 +239,11 @@ def _arrangement(arrangement: Arrangement, system: System | Assembly) -> dict[st
     return {"arrangement": json.dumps(arrangement_entry(own))}
 
 
-def _system(trajectory: Trajectory) -> System | Assembly:
+def _system(trajectory: Trajectory) -> Moving:
     if not isinstance(trajectory, Trajectory):
         msg = f"trajectory: expected a Trajectory; got {type(trajectory).__name__}"
         raise TypeError(msg)
-    if not isinstance(trajectory.system, System | Assembly):
+    if not isinstance(trajectory.system, Moving):
         msg = (
             "trajectory: expected that of a System; got one of "
             f"{type(trajectory.system).__name__}: save_run keeps runs in the drum"
@@ -250,7 +252,7 @@ def _system(trajectory: Trajectory) -> System | Assembly:
     return trajectory.system
 
 
-def _attributes(trajectory: Trajectory, system: System | Assembly) -> dict[str, Any]:
+def _attributes(trajectory: Trajectory, system: Moving) -> dict[str, Any]:
     return {
         "title": "Motion of a system with unilateral contacts",
         **motion_attributes(trajectory, system.bodies.contact_names),
@@ -258,8 +260,10 @@ def _attributes(trajectory: Trajectory, system: System | Assembly) -> dict[str, 
     }
 
 
-def _told(system: System | Assembly) -> dict[str, Any]:
+def _told(system: Moving) -> dict[str, Any]:
     """Return a system as plain values, formulas as text."""
+    if isinstance(system, Drift):
+        return _drift(system)
     told: dict[str, Any] = {}
     if system.ties:
         told["ties"] = [described_tie(tie, formula_text) for tie in system.ties]
@@ -269,6 +273,28 @@ def _told(system: System | Assembly) -> dict[str, Any]:
     bodies = {f"kind {name}": _body(kind) for name, kind in system.kinds.items()}
     pairs = {f"between {a} and {b}": _between(f) for (a, b), f in system.between.items()}
     return bodies | pairs | {"count": dict(system.count)} | told
+
+
+def _drift(drift: Drift) -> dict[str, Any]:
+    """Return first-order motion as plain values."""
+    manifold, polyhedron, text = drift.manifold, drift.polyhedron, formula_text
+    return {
+        "coordinates": list(manifold.names),
+        "periods": [str(period) for period in manifold.periods],
+        "scales": list(manifold.scales),
+        "contacts": list(drift.contacts),
+        "velocity": {name: text(u) for name, u in drift.velocity.items()},
+        "potential": None if drift.energy is None else _gap(drift.energy),
+        "mobility": [[text(e) for e in row] for row in drift.mobility_formulas.tolist()],
+        "noise": drift.noise,
+        "limits": {name: text(e) for name, e in drift.limits.items()},
+        "gaps": {f.name: _gap(f) for f in polyhedron.functions},
+        "unions": [[sorted(piece) for piece in union] for union in polyhedron.unions[1]],
+        "equations": {h.name: [text(h.expression), *h.parameters] for h in polyhedron.stated},
+        "count": drift.count,
+        "between": _between(drift.between),
+        "exits": dict(drift.exits),
+    }
 
 
 def _body(system: System) -> dict[str, Any]:
@@ -353,7 +379,7 @@ def _digest(family: Family) -> str:
     return family.program().digest()
 
 
-def _read(content: "xr.Dataset", system: System | Assembly) -> "str | Trajectory":
+def _read(content: "xr.Dataset", system: Moving) -> "str | Trajectory":
     written, here = json.loads(content.attrs["system"]), _told(system)
     for key, value in here.items():
         if "count" in written and key not in written:  # of one kind and of several
@@ -363,7 +389,7 @@ def _read(content: "xr.Dataset", system: System | Assembly) -> "str | Trajectory
     q, v = (
         [np.array(content[name + end].values) for end, _ in _kinds(system)] for name in ("q", "v")
     )
-    if isinstance(system, System):
+    if not isinstance(system, Assembly):
         return read_motion(content, system, q[0], v[0])
     # Each has the shape of its kind: together they might have the right size otherwise.
     for kind, *each in zip(system.bodies.kinds, q, v, strict=True):
@@ -374,9 +400,10 @@ def _read(content: "xr.Dataset", system: System | Assembly) -> "str | Trajectory
     return read_motion(content, system, *joined)
 
 
-def _gaps(system: System, q: Any) -> Any:
+def _gaps(system: System | Drift, q: Any) -> Any:
     """Return the gaps of all contacts at places of a body, or of several of a kind."""
     rows, names = q.reshape(-1, q.shape[-1]), system.manifold.names
-    further = [hulls.values(names, rows) for hulls in system.hulls]
+    hulls = () if isinstance(system, Drift) else system.hulls
+    further = [some.values(names, rows) for some in hulls]
     gaps = [system.polyhedron.values(q), *(f.reshape(*q.shape[:-1], -1) for f in further)]
     return np.concatenate(gaps, axis=-1)

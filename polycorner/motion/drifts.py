@@ -171,6 +171,11 @@ class Drift(MechanicalSystem, Printed):
         return self.polyhedron.manifold
 
     @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the unilateral contacts of a body with its surroundings."""
+        return self.polyhedron.names
+
+    @property
     def hidden(self) -> frozenset[str]:
         """Names of the equations of unit vectors and quaternions."""
         return self.polyhedron.hidden
@@ -356,8 +361,7 @@ class Drift(MechanicalSystem, Printed):
             at = np.column_stack([flat, np.full(len(flat), real("time", time))])
             found += self.flow.evaluate(at, order=0)[0]
         if self.energy is not None:
-            for row, q_ in zip(found, flat, strict=True):
-                row -= self.mobility_at(q_) @ self.energy.gradient(q_)
+            found -= [self.mobility_at(at) @ self.energy.gradient(at) for at in flat]
         return np.asarray(found.reshape(places.shape))
 
     @checked
@@ -382,7 +386,7 @@ class Drift(MechanicalSystem, Printed):
             q = state.q.reshape(-1, self.manifold.size)[0]
             units = self.bodies.body.units
             widest = max(self.mobility_at(q)[c, c] * units[c] ** 2 for c in self.bodies.position)
-            jump = self.bodies.contacts.reach ** 2 / (2 * self.noise * widest)
+            jump = self.bodies.contacts.reach**2 / (2 * self.noise * widest)
             if jump < longest:
                 return jump, "beyond which bodies jump over each other"
         return longest, why

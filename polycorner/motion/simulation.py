@@ -59,7 +59,7 @@ import threading
 import time
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -188,7 +188,8 @@ def _recorder(engine: Any) -> "Recorder":
     from polycorner.motion.recorder import Recorder
     from polycorner.motion.sweeping.driver import DriftEngine
 
-    return DriftRecorder(engine) if isinstance(engine, DriftEngine) else Recorder(engine)
+    drifts = isinstance(engine, DriftEngine)
+    return DriftRecorder(cast("Any", engine)) if drifts else Recorder(engine)
 
 
 def _steps(duration: float, dt: float) -> tuple[int, float]:
@@ -325,7 +326,8 @@ def start(
             raise ValueError(msg)
     noise = Noise() if noise is None else instance("noise", noise, Noise)
     if isinstance(system, Drift):
-        return _start_drift(system, placed[0], state, dt, noise, solver, memory)
+        # It is used as the engine of other systems is.
+        return cast("Engine", _start_drift(system, placed[0], state, dt, noise, solver, memory))
     every = [name for kind in bodies.kinds for name in kind.body.formulation.coordinates]
     names("kicks", noise.kicks, list(dict.fromkeys(every)))
     if noise.kicks and noise.kick_time:

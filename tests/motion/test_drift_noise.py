@@ -53,7 +53,8 @@ def test_the_density_is_uniform_in_an_l_and_ergodic_around_its_corner():
     D = Polyhedron(PLANE, AllOf(X, 1 - X, Y, 1 - Y, AnyOf(0.5 - X, 0.5 - Y)))
     drift = Drift(D, noise=0.5, count=300)
     places, path = late(drift, np.full((300, 2), 0.25), 3.0, 0.004, 3, 1.0)
-    assert D.implicit(places).min() >= -1e-9 and path.converged
+    assert D.implicit(places).min() >= -1e-9
+    assert path.converged
     share, error = mean_of((places < 0.5).all(axis=-1))
     assert share == pytest.approx(1 / 3, abs=4 * error + 0.01)
     across, error = mean_of(places[..., 0])
@@ -130,6 +131,7 @@ def mean_exit(potential, start, low, high, noise):
 
     It is ``int_start^high exp(E(y) / T) / T  int_low^y exp(-E(z) / T) dz dy``.
     """
+
     def inner(y):
         return quad(lambda z: math.exp((potential(y) - potential(z)) / noise), low, y)[0]
 
@@ -141,7 +143,9 @@ def exit_times(potential, start, limit, noise, dt, count, t_end, seed):
         Polyhedron(LINE, {"floor": S + 2}), potential=potential, noise=noise, count=count,
         exits={"s": limit},
     )  # fmt: skip
-    path = simulate(drift, drift.state(np.full((count, 1), start)), t_end, dt, noise=Noise(seed=seed))
+    path = simulate(
+        drift, drift.state(np.full((count, 1), start)), t_end, dt, noise=Noise(seed=seed)
+    )
     assert not path.present[-1].any()
     times = np.array([e.time for e in path.of_kind(EventKind.EXIT)])
     return times.mean(), times.std(ddof=1) / math.sqrt(count)
@@ -163,6 +167,8 @@ def test_escape_from_a_well_takes_the_time_of_the_quadrature_and_has_its_barrier
     D = Polyhedron(LINE, {"low": S + 2, "high": 2 - S})
     found = landscape(D, energy, box=[(-2, 2)])
     start = int(np.argmin([m.point[0] for m in found.minima]))
-    slope = (math.log(mean_exit(well, -1, -2, 1, 0.004)) - math.log(mean_exit(well, -1, -2, 1, 0.005))) / 50
+    slope = (
+        math.log(mean_exit(well, -1, -2, 1, 0.004)) - math.log(mean_exit(well, -1, -2, 1, 0.005))
+    ) / 50
     low, high = found.depth(start)
     assert low - 0.01 <= slope <= high + 0.01

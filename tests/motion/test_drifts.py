@@ -2,7 +2,7 @@
 definition, one projection by a general solver in each step."""
 
 import math
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -64,7 +64,11 @@ def test_what_is_admitted_is_a_projection_onto_the_tangent_cone(rows, wished, mo
         return
     J /= np.linalg.norm(J, axis=1)[:, None]
     D = Polyhedron(M, [sum(float(x) * q for x, q in zip(row, M.symbols, strict=True)) for row in J])
-    drift = Drift(D, dict(zip(M.names, wished, strict=True)), mobility=dict(zip(M.names, mobility, strict=True)))
+    drift = Drift(
+        D,
+        dict(zip(M.names, wished, strict=True)),
+        mobility=dict(zip(M.names, mobility, strict=True)),
+    )
     path = simulate(drift, drift.state(np.zeros(3)), 1e-3, 1e-3)
     v, G = path.v[0, 0], np.linalg.inv(B)
     assert (J @ v).min() >= -CLOSE
@@ -81,14 +85,17 @@ def test_the_identity_holds_along_a_motion_around_corners_and_curves():
     drift = Drift(D, {"x": 1 + sp.sin(TIME), "y": -sp.Rational(1, 2) * sp.cos(3 * TIME)})
     path = simulate(drift, drift.state([-1.0, 0.3]), 4.0, 0.01)
     touched = 0
-    for time, q, v, touching in zip(path.times, path.q[:, 0], path.v[:, 0], path.touching, strict=True):
+    for time, q, v, touching in zip(
+        path.times, path.q[:, 0], path.v[:, 0], path.touching, strict=True
+    ):
         u = drift.wished(q, time)
         assert abs(v @ v + (u - v) @ (u - v) - u @ u) < 1e-9
         values, gradients = D.evaluate(q)
         pushed = np.zeros(2)
         for _, name, force in touching:
             i = D.names.index(name)
-            assert abs(values[i]) < 1e-6 and force >= 0
+            assert abs(values[i]) < 1e-6
+            assert force >= 0
             assert gradients[i] @ v >= -1e-9
             pushed += force * gradients[i]
             touched += 1
@@ -105,7 +112,7 @@ def angle_on_the_disc(start, duration):
 
 
 def orders(errors):
-    return [math.log2(a / b) for a, b in zip(errors, errors[1:], strict=False)]
+    return [math.log2(a / b) for a, b in pairwise(errors)]
 
 
 def test_sliding_on_a_curve_is_of_second_order_and_stays_on_it():
@@ -140,11 +147,9 @@ def test_a_mobility_turns_what_walls_do():
 def test_a_gradient_flow_is_of_second_order_with_a_mobility_that_turns_with_a_rod():
     """A rod sinks: its centre drifts sideways as B(phi) of an inclined rod says."""
     M = Manifold.euclidean("x y phi")
-    x, y, phi = M.symbols
+    _x, y, phi = M.symbols
     c, s = sp.cos(phi), sp.sin(phi)
-    B = sp.Matrix(
-        [[2 * c**2 + s**2, c * s, 0], [c * s, 2 * s**2 + c**2, 0], [0, 0, 1]]
-    )
+    B = sp.Matrix([[2 * c**2 + s**2, c * s, 0], [c * s, 2 * s**2 + c**2, 0], [0, 0, 1]])
     drift = Drift(Polyhedron(M, {}), {"phi": sp.S(1) / 2}, potential=y, mobility=B.tolist())
     errors = []
     for n in (8, 16, 32):
@@ -202,7 +207,9 @@ def test_limits_bound_the_velocity_where_they_say():
 
 
 def test_a_ratchet_goes_one_way():
-    drift = Drift(Polyhedron(LINE, {}), {"s": sp.cos(TIME)}, limits={"ratchet": velocities(LINE)[0]})
+    drift = Drift(
+        Polyhedron(LINE, {}), {"s": sp.cos(TIME)}, limits={"ratchet": velocities(LINE)[0]}
+    )
     path = simulate(drift, drift.state([0.0]), 2 * math.pi, 2 * math.pi / 400)
     assert path.q[-1, 0, 0] == pytest.approx(2.0, abs=1e-3)
     assert path.v.min() >= -1e-9
@@ -218,7 +225,9 @@ def test_limits_and_contacts_are_one_projection():
 
 
 def test_what_contacts_and_limits_do_not_admit_fails():
-    drift = Drift(Polyhedron(LINE, {"wall": 1 - S}), {"s": 1}, limits={"go": velocities(LINE)[0] - 1})
+    drift = Drift(
+        Polyhedron(LINE, {"wall": 1 - S}), {"s": 1}, limits={"go": velocities(LINE)[0] - 1}
+    )
     path = simulate(drift, drift.state([1.0]), 0.2, 0.1)
     assert {e.kind for e in path.events} >= {EventKind.FAILED}
     assert not path.converged
@@ -264,7 +273,7 @@ def test_two_discs_at_a_door_stop_as_an_arch():
 
 
 def test_discs_at_a_door_move_as_the_nearest_placements_do():
-    """The same as projections from the definition, with the difference of a scheme of first order."""
+    """Projections from the definition are of first order, and tend to the same motion."""
     radius, door = 0.2, 0.5
     walls = lambda p: ((door - p[0] - p[1]) / math.sqrt(2), (door - p[0] + p[1]) / math.sqrt(2))  # noqa: E731
     start = np.array([[-1.2, 0.5], [-1.1, 0.0], [-1.25, -0.45], [-1.7, 0.2], [-1.7, -0.25]])
@@ -300,7 +309,9 @@ def test_one_step_of_a_crowd_is_the_projection_of_its_wish():
     path = simulate(drift, drift.state(crowd(30, radius, 0)), 2.0, h, every=1)
     assert path.converged
     q, end = path.q[-2], path.q[-1]
-    pairs = [(i, j) for i, j in combinations(range(30), 2) if np.linalg.norm(q[i] - q[j]) < 3 * radius]
+    pairs = [
+        (i, j) for i, j in combinations(range(30), 2) if np.linalg.norm(q[i] - q[j]) < 3 * radius
+    ]
     assert sum(len(touch[0]) == 2 for touch in path.touching[-1]) > 20
     middle, d = (q + end) / 2, cvxpy.Variable((30, 2))
     wish = h * np.column_stack([np.ones(30), -middle[:, 1]])
@@ -309,8 +320,7 @@ def test_one_step_of_a_crowd_is_the_projection_of_its_wish():
         n = (middle[j] - middle[i]) / np.linalg.norm(middle[j] - middle[i])
         gap = np.linalg.norm(end[j] - end[i]) - 2 * radius - n @ ((end - q)[j] - (end - q)[i])
         rows.append(gap + n @ (d[j] - d[i]) >= 0)
-    for sign in (1, -1):
-        rows.append(0.6 - (q + d)[:, 0] - sign * (q + d)[:, 1] >= 0)
+    rows += [0.6 - (q + d)[:, 0] - sign * (q + d)[:, 1] >= 0 for sign in (1, -1)]
     cvxpy.Problem(cvxpy.Minimize(cvxpy.sum_squares(d - wish)), rows).solve(solver="CLARABEL")
     assert np.abs(d.value - (end - q)).max() < 1e-6
 
@@ -321,7 +331,8 @@ def test_nothing_overlaps_in_a_crowd_and_who_passes_leaves():
         funnel(0.6), {"x": 1, "y": -2 * Y}, count=25, between=discs(radius), exits={"x": 0.2}
     )
     path = simulate(drift, drift.state(crowd(25, radius, 1)), 5.0, 0.02)
-    assert path.converged and path.max_penetration < 1e-6
+    assert path.converged
+    assert path.max_penetration < 1e-6
     left = path.of_kind(EventKind.EXIT)
     assert len(left) == 25 - path.present[-1].sum() > 0
     for q, here in zip(path.q, path.present, strict=True):
@@ -339,7 +350,9 @@ def test_bodies_meet_across_the_border_of_a_period():
     path = simulate(drift, drift.state([[9.0, 0.0], [1.0, 0.1]]), 1.2, 0.01)
     chord = math.sqrt(1 - 0.1**2)
     made = path.of_kind(EventKind.MADE)[0]
-    assert made.time == pytest.approx(2 - 10 / math.pi * math.asin(math.pi * chord / 10), abs=1e-6)
+    assert made.time == pytest.approx(
+        2 - 10 / math.pi * math.asin(math.pi * chord / 10), abs=0.01**2
+    )
 
 
 # ------------------------------------------------------------------------- runs, files, refusals
@@ -370,16 +383,33 @@ def test_an_interrupted_run_is_resumed(tmp_path):
     with pytest.raises(StopError):
         simulate(drift, start, 1.0, 0.01, every=10, noise=noise, checkpoint=saves, progress=stop)
     found = simulate(drift, start, 1.0, 0.01, every=10, noise=noise, checkpoint=saves)
-    assert (found.q == whole.q).all() and (found.v == whole.v).all()
+    assert (found.q == whole.q).all()
+    assert (found.v == whole.v).all()
     with pytest.raises(ValueError, match="noise"):
         simulate(drift, start, 1.0, 0.01, every=10, checkpoint=saves)
+
+
+def test_files_and_datasets_have_the_motion(tmp_path):
+    from polycorner.files import load_trajectory, save_trajectory
+
+    drift = Drift(funnel(0.6), {"x": 1, "y": -Y}, count=4, between=discs(0.2), exits={"x": 0.0})
+    path = simulate(drift, drift.state(crowd(4, 0.2, 2)), 2.0, 0.01)
+    found = load_trajectory(save_trajectory(path, tmp_path / "crowd.nc"), drift)
+    assert (found.q == path.q).all()
+    assert list(found.events) == list(path.events)
+    assert {*path.work} == {"velocity", "noise", "left"}
+    assert [*path.dissipated] == ["drag"]
+    other = Drift(funnel(0.6), {"x": 2, "y": -Y}, count=4, between=discs(0.2), exits={"x": 0.0})
+    with pytest.raises(ValueError, match="velocity"):
+        load_trajectory(tmp_path / "crowd.nc", other)
 
 
 def test_a_step_is_the_first_of_a_run():
     drift = Drift(disc(), {"x": 1})
     start = drift.state([-1.0, 0.1])
     one, path = step(drift, start, 0.01), simulate(drift, start, 0.02, 0.01)
-    assert one.q.tolist() == path.q[1, 0].tolist() and one.v.tolist() == path.v[1, 0].tolist()
+    assert one.q.tolist() == path.q[1, 0].tolist()
+    assert one.v.tolist() == path.v[1, 0].tolist()
 
 
 def test_a_body_rests_in_a_corner_and_moves_again():
@@ -387,9 +417,8 @@ def test_a_body_rests_in_a_corner_and_moves_again():
     drift = Drift(D, {"s": sp.cos(TIME)})
     path = simulate(drift, drift.state([0.5]), 4.0, 0.01)
     kinds = [e.kind for e in path.events]
-    assert kinds == [EventKind.MADE, EventKind.REST, EventKind.LOST, EventKind.MOTION] or kinds == [
-        EventKind.MADE, EventKind.REST, EventKind.MOTION, EventKind.LOST,
-    ]  # fmt: skip
+    assert kinds[:2] == [EventKind.MADE, EventKind.REST]
+    assert {*kinds[2:]} == {EventKind.MOTION, EventKind.LOST}
     assert path.events[0].time == pytest.approx(math.asin(0.5), abs=1e-3)
     assert path.of_kind(EventKind.LOST)[0].time == pytest.approx(math.pi / 2, abs=0.01)
     assert path.q[-1, 0, 0] == pytest.approx(math.sin(4.0) - 1 + 1, abs=1e-3)
@@ -399,7 +428,10 @@ def test_a_body_rests_in_a_corner_and_moves_again():
     ("given", "sentence"),
     [
         ({"velocity": {"z": 1}}, "velocity: "),
-        ({"velocity": {"x": VX}}, "velocity: expected a formula in time, x, y for 'x'; got 'x_dot'"),
+        (
+            {"velocity": {"x": VX}},
+            "velocity: expected a formula in time, x, y for 'x'; got 'x_dot'",
+        ),
         ({"noise": -1}, "noise: "),
         ({"limits": {"l": 1 - VX**2}}, "limits: expected a formula that is affine in velocities"),
         ({"limits": {"floor": 1 - VX}}, "limits: expected names of their own"),
@@ -414,7 +446,8 @@ def test_a_body_rests_in_a_corner_and_moves_again():
 def test_bad_input_gets_a_sentence(given, sentence):
     with pytest.raises((TypeError, ValueError)) as told:
         Drift(Polyhedron(PLANE, {"floor": Y}), **given)
-    assert sentence in str(told.value) and "\n" not in str(told.value)
+    assert sentence in str(told.value)
+    assert "\n" not in str(told.value)
 
 
 def test_bad_states_and_runs_get_a_sentence():
@@ -423,7 +456,7 @@ def test_bad_states_and_runs_get_a_sentence():
         drift.state([0.0, -1.0])
     with pytest.raises(ValueError, match="v: expected none"):
         drift.state([0.0, 1.0], [1.0, 0.0])
-    with pytest.raises(ValueError, match="dt: expected at most 0.01 s, beyond which the motion"):
+    with pytest.raises(ValueError, match=r"dt: expected at most 0\.01 s, beyond which the motion"):
         simulate(drift, drift.state([0.0, 1.0]), 1.0, 0.1)
     with pytest.raises(TypeError, match="noise: expected a seed alone"):
         simulate(drift, drift.state([0.0, 1.0]), 1.0, 0.01, noise=Noise(kicks={"x": 1.0}))

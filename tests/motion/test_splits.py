@@ -28,7 +28,9 @@ def test_a_point_slides_down_a_roof_on_the_side_where_it_falls():
         path = simulate(drift, drift.state([x, 1.0]), 2.0, 0.01)
         # it meets the roof at y = -|x|, and slides with (1, -1) / 2
         slid = (2.0 - (1.0 + abs(x))) / 2
-        assert path.q[-1, 0] == pytest.approx([x + math.copysign(slid, x), -abs(x) - slid], abs=1e-6)
+        assert path.q[-1, 0] == pytest.approx(
+            [x + math.copysign(slid, x), -abs(x) - slid], abs=1e-6
+        )
         assert not path.splits
 
 
@@ -94,7 +96,12 @@ def test_splits_of_an_interrupted_run_are_kept(tmp_path):
     path = simulate(drift, start, 2.0, 0.01, every=10, checkpoint=saves)
     whole = simulate(drift, start, 2.0, 0.01, every=10)
     (here,), (there,) = path.splits, whole.splits
-    assert (here.time, here.body, here.pieces, here.taken) == (there.time, there.body, there.pieces, there.taken)
+    assert (here.time, here.body, here.pieces, here.taken) == (
+        there.time,
+        there.body,
+        there.pieces,
+        there.taken,
+    )
     assert all((a.q == b.q).all() for a, b in zip(here.states, there.states, strict=True))
 
 
@@ -139,7 +146,9 @@ def continued(drift, state, t_end, dt):
 def test_a_galton_board_has_all_its_continuations():
     board = galton()
     drift = Drift(board.polyhedron, potential=board.energy)
-    ends = sorted(round(float(x), 6) for x, y in continued(drift, drift.state([4.0, 7.5]), 30.0, 0.05))
+    ends = sorted(
+        round(float(x), 6) for x, y in continued(drift, drift.state([4.0, 7.5]), 30.0, 0.05)
+    )
     # two rows: the pockets 2, 4 and 6 by one, two and one ways
     assert ends == [2.0, 4.0, 4.0, 6.0]
 

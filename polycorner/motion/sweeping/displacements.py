@@ -92,19 +92,26 @@ def start_rows(s, st, w, low, high):
 
 
 @compiled
+def fails(s, w, r, value, ahead):
+    """Return whether a row that is not in the programme is negative, now or at the end."""
+    if w.listed[r] != IDLE:
+        return False
+    return value[r] + (along(s, w, r, w.d) if ahead else 0.0) < 0.0
+
+
+@compiled
 def violated(s, st, w, low, high, count, value, ahead):
     """Add rows that fail: gaps that are negative, after the displacement to first order or now."""
     a, b, c, d = ends_of(s, w, low, high)
     for r in range(a, b):
-        if w.on[r] and w.listed[r] == IDLE and st.alive[w.owner[r, 0]]:
-            if value[r] + (along(s, w, r, w.d) if ahead else 0.0) < 0.0:
-                count = add_row(s, w, r, count)
-                w.shift[r], w.force[r] = value[r], 0.0
+        if w.on[r] and st.alive[w.owner[r, 0]] and fails(s, w, r, value, ahead):
+            count = add_row(s, w, r, count)
+            w.shift[r], w.force[r] = value[r], 0.0
     for r in range(c, d):
-        if w.listed[r] == IDLE and st.alive[w.owner[r, 0]] and st.alive[w.owner[r, 1]]:
-            if value[r] + (along(s, w, r, w.d) if ahead else 0.0) < 0.0:
-                count = add_row(s, w, r, count)
-                w.shift[r], w.force[r] = value[r], 0.0
+        alive = st.alive[w.owner[r, 0]] and st.alive[w.owner[r, 1]]
+        if alive and fails(s, w, r, value, ahead):
+            count = add_row(s, w, r, count)
+            w.shift[r], w.force[r] = value[r], 0.0
     return count
 
 

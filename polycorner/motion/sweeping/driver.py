@@ -153,7 +153,9 @@ class DriftEngine:
         rows = own + np.flatnonzero(touch[own:-1])
         self.state["counts"][KEPT] = len(rows)
         pairs = w["owner"][rows]
-        self.state["keys"][: len(rows)] = (pairs[:, 0] * N + pairs[:, 1]) * G + (rows - own) % max(G, 1)
+        self.state["keys"][: len(rows)] = (pairs[:, 0] * N + pairs[:, 1]) * G + (rows - own) % max(
+            G, 1
+        )
         self.state["pair_touches"][: len(rows)] = 1
 
     def _make_room(self) -> None:

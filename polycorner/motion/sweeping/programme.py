@@ -112,7 +112,7 @@ def residual(s, w, count):
 
 @compiled
 def apply(s, w, low, high, count, x, product):
-    """Multiply numbers of rows by the matrix ``J B J'`` of the programme, scaled to a diagonal of 1.
+    """Multiply numbers of rows by the programme's matrix ``J B J'``, scaled to a diagonal of 1.
 
     ``w.step`` is the displacement that belongs to them.
     """
@@ -153,13 +153,13 @@ def spread(s, w, low, high, count):
 
 
 @compiled
-def slopes(s, w, low, high, count, fresh):
-    """Set the slopes of the function by scaled forces; return three products that tell how to go.
+def slopes(s, w, count, fresh):
+    """Set the slopes of the function by scaled forces; return two products that tell how to go.
 
-    Those are the squares of the slopes that a force of zero may follow, and of those that positive
-    forces may follow, these by what is left of the forces.
+    They are the squares of the slopes that forces of zero may follow, and the products of those
+    that others may follow with how far they may do so.
     """
-    bound = free = left = 0.0
+    bound = left = 0.0
     for e in range(count):
         r = w.active[e]
         if not w.size[r] > 0.0:
@@ -169,17 +169,16 @@ def slopes(s, w, low, high, count, fresh):
             w.slope[r] = (along(s, w, r, w.d) + w.shift[r]) / root
         slope, force = w.slope[r], w.force[r] * root
         if is_equation(s, r) or force > 0.0:
-            free += slope * slope
             kept = slope if is_equation(s, r) else min(slope, force / w.room[STRIDE])
             left += slope * kept
         elif slope < 0.0:
             bound += slope * slope
-    return bound, free, left
+    return bound, left
 
 
 @compiled
 def head(s, w, count, zero):
-    """Let the course follow the slopes of forces that are positive, or, if told so, of zero ones."""
+    """Let the course follow the slopes of positive forces or, if told so, of those at zero."""
     for e in range(count):
         r = w.active[e]
         w.course[r] = 0.0
@@ -206,7 +205,7 @@ def move(s, w, low, high, count, length):
 
 @compiled
 def expand(s, w, count):
-    """Change forces by a step of fixed length along the slopes, those that reach zero stay there."""
+    """Change forces by a step of fixed length along the slopes, to zero at the least."""
     for e in range(count):
         r = w.active[e]
         if w.size[r] > 0.0 and (is_equation(s, r) or w.force[r] > 0.0):
@@ -227,7 +226,7 @@ def descend(s, w, low, high, count, tolerance, steps):
     """
     never_inline()
     w.room[STRIDE] = PACE / spread(s, w, low, high, count)
-    bound, free, left = slopes(s, w, low, high, count, True)
+    bound, left = slopes(s, w, count, True)
     head(s, w, count, False)
     for done in range(steps):
         if done % CHECKED == 0 and residual(s, w, count) <= tolerance:
@@ -257,10 +256,10 @@ def descend(s, w, low, high, count, tolerance, steps):
         if zero or length > most:
             if length > most:
                 expand(s, w, count)
-            bound, free, left = slopes(s, w, low, high, count, True)
+            bound, left = slopes(s, w, count, True)
             head(s, w, count, False)
             continue
-        bound, free, left = slopes(s, w, low, high, count, False)
+        bound, left = slopes(s, w, count, False)
         turn = 0.0
         for e in range(count):
             r = w.active[e]

@@ -53,7 +53,7 @@ def step_of(s, st, w, log, low, high, t, index, events):
                 h *= part
                 why, count = displace(s, st, w, low, high, now, h, ask)
                 st.counts[PARTS] += 1
-        if why == NOT_FINITE or why == SPLIT:
+        if why in (NOT_FINITE, SPLIT):
             w.room[PART] = (now - t + w.room[PART] * h) / s.step
             return why, events
         if why == FAILED:
@@ -76,13 +76,13 @@ def step(s, st, w, log, index, events):
     together = s.pair_gaps > 0 and N > 1
     if together:
         room = max(s.detection, w.room[ROOM])
-        if not w.status[IS_LISTED] or farthest(s, st, w, st.q) > 0.25 * room:
-            if not list_neighbours(s, st, w, st.q, room):
-                return PAIRS_FULL, events
+        known = w.status[IS_LISTED] and farthest(s, st, w, st.q) <= 0.25 * room
+        if not known and not list_neighbours(s, st, w, st.q, room):
+            return PAIRS_FULL, events
     load_forces(s, st, w)
     remember(s, st, w)
     before = events
-    for low in range(0, 1 if together else N):
+    for low in range(1 if together else N):
         high = N if together else low + 1
         if not together and not st.alive[low]:
             continue
@@ -193,7 +193,7 @@ def admit(system, state, work, log, steps):
     if together and not list_neighbours(s, st, w, st.q, max(s.detection, w.room[ROOM])):
         return PAIRS_FULL, 0, 0
     load_forces(s, st, w)
-    for low in range(0, 1 if together else N):
+    for low in range(1 if together else N):
         high = N if together else low + 1
         if not together and not st.alive[low]:
             continue
