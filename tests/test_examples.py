@@ -47,6 +47,7 @@ from examples import (
     ex35_slider_crank,
     ex36_nested_corner,
     ex37_sticky_clusters,
+    ex38_pinball_pockets,
 )
 from polycorner import Verdict, minimise, stratum_at
 from polycorner.dumbbells import DumbbellPair
@@ -152,6 +153,19 @@ def test_sticky_clusters(tmp_path):
     assert sorted(measured.probabilities) == pytest.approx([0.04, 0.96])
     assert between.passage_times([1])[1] == 0
     picture = ex37_sticky_clusters.draw(measured, tmp_path / "clusters.png")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_pinball_pockets(tmp_path):
+    tree, shares = ex38_pinball_pockets.main(100)
+    ends = [ex38_pinball_pockets.pocket(*m.q[-1, 0].tolist()) for m in tree if not m.splits]
+    assert sorted(ends) == ["cup", "floor", "valley", "valley"]
+    for found in shares.values():
+        assert sum(p for p, _ in found.values()) == pytest.approx(1.0)
+    # By symmetry of the first roof and of the roofs below it
+    cup, error = shares[1e-3]["cup"]
+    assert cup == pytest.approx(shares[1e-3]["floor"][0], abs=6 * error)
+    picture = ex38_pinball_pockets.draw(tree, tmp_path / "ways.png")
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 

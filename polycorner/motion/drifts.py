@@ -119,7 +119,7 @@ class Drift(MechanicalSystem, Printed):
             given = as_expressions(argument, getattr(self, argument))
             object.__setattr__(self, argument, given)
         check_fields(self)
-        names("velocity", self.velocity, self.manifold.names)
+        names("velocity by coordinates of the polyhedron", self.velocity, self.manifold.names)
         self._check_symbols("velocity", {*self.manifold.symbols, time_symbol()})
         own, rates = {*self.manifold.symbols}, velocities(self.manifold)
         self._check_symbols("limits", {*own, *rates, time_symbol()})
@@ -224,12 +224,13 @@ class Drift(MechanicalSystem, Printed):
         """Whether the mobility depends on the coordinates."""
         return bool(self.mobility_formulas.free_symbols)
 
+    @checked
     def mobility_at(self, q: ArrayLike) -> Array:
         """Return ``B(q)``, ``(n, n)``."""
-        n = self.manifold.size
+        n, at = self.manifold.size, self.manifold.point(q)
         if not self.mobility_varies:
             return np.array(self.mobility_formulas.tolist(), dtype=np.float64)
-        (values,) = self.mobilities.evaluate(np.asarray(q, dtype=np.float64), order=0)
+        (values,) = self.mobilities.evaluate(at, order=0)
         found = np.zeros((n, n))
         found[np.tril_indices(n)] = values
         return np.asarray(found + np.tril(found, -1).T)

@@ -106,20 +106,23 @@ def simulate(
 ) -> "Trajectory":
     """Simulate a system from a state until ``t_end`` by Moreau-Jean time stepping.
 
-    Each step solves the inclusion stated in :mod:`polycorner.motion.simulation` ([Moreau], [AB]).
+    Each step solves the inclusion stated in :mod:`polycorner.motion.simulation` ([Moreau], [AB]);
+    of a :class:`~polycorner.Drift` it projects the displacement that is wished ([Moreau77]), and
+    ``path.v`` and forces are those admitted at each instant, not means over a step.
     Smooth motion, impacts and the loss of contact are of second order in ``dt``; the onset of slip
     is located to first order.
 
     Parameters
     ----------
-    system : System or another MechanicalSystem, such as a DumbbellDrum
+    system : System, Drift or another MechanicalSystem, such as a DumbbellDrum
     state : State
-        See :meth:`System.state`.
+        See :meth:`System.state`, :meth:`Drift.state`.
     t_end, dt : float
         End and longest step, in s.  Steps are equal, and the last ends at ``t_end``.
     every : int, optional
         Record every so many steps; default such that about a thousand instants are recorded.
     noise : Noise, optional
+        Of a :class:`~polycorner.Drift` the seed alone: its noise is its own.
     solver : Solver, optional
         How exactly steps are solved; default ``system.solver``.
     progress : callable, optional

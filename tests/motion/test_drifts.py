@@ -427,7 +427,7 @@ def test_a_body_rests_in_a_corner_and_moves_again():
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"velocity": {"z": 1}}, "velocity: "),
+        ({"velocity": {"z": 1}}, "velocity by coordinates of the polyhedron: "),
         (
             {"velocity": {"x": VX}},
             "velocity: expected a formula in time, x, y for 'x'; got 'x_dot'",

@@ -79,6 +79,15 @@ def contact_family():
     return motion.ContactFamily({"touch": gap}, 1.0, friction=(pair_friction(),))
 
 
+drift = cache(lambda: pc.Drift(square(), {"x": 1}, potential=Y, noise=0.1))
+
+
+@cache
+def split():
+    drift = pc.Drift(pc.Polyhedron(M, pc.AnyOf(Y + X, Y - X)), {"y": -1})
+    return pc.simulate(drift, drift.state([0, 1]), 1.2, 0.1).splits[0]
+
+
 @cache
 def assembly():
     kinds = dict.fromkeys(("a", "b"), system())

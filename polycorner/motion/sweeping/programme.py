@@ -16,7 +16,7 @@ from polycorner.formulas.compilation import never_inline
 from polycorner.motion.sweeping.draws import compiled
 from polycorner.motion.sweeping.records import SWEEPS
 
-ROUND, STRETCH = 4, 200  # sweeps, and steps of gradients, in turn
+ROUND, STRETCH = 4, 2000  # sweeps, and steps of gradients, in turn
 CHECKED = 5  # steps of gradients between two looks at what is left
 POWERS, MARGIN = 8, 1.1  # of the matrix, whose largest eigenvalue is a little above what they tell
 PACE = 1.9  # length of a step of fixed length, over that eigenvalue: less than 2
