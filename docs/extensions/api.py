@@ -148,10 +148,10 @@ GROUPS = (
         "Simulate motion",
         "Bodies with contacts, impacts and friction: a system, a start, a trajectory.",
         {
-            "": "System State simulate Trajectory",
-            "motion": "Assembly MotionOfKind step Event EventKind Checkpoint Solver MotionOptions "
-            "MechanicalSystem Accelerations Consistency accelerations ContactForce ContactForces "
-            "contact_forces",
+            "": "System Drift State simulate Trajectory",
+            "motion": "Assembly MotionOfKind step Event EventKind Split Checkpoint Solver "
+            "MotionOptions MechanicalSystem Accelerations Consistency accelerations ContactForce "
+            "ContactForces contact_forces",
         },
     ),
     Group(

@@ -216,7 +216,7 @@ def _moving(argument: str, arrangement: Arrangement, path: Trajectory) -> Poses:
         several: Any = path
         places = [several[name].q for name in arrangement.named]
         rates = [several[name].v for name in arrangement.named]
-    return recorded(arrangement, path.times, places, rates, path.present, path.touching)
+    return recorded(arrangement, path.times, places, rates, path.present, tuple(path.touching))
 
 
 def recorded(

@@ -227,7 +227,7 @@ class Drift(MechanicalSystem, Printed):
     @checked
     def mobility_at(self, q: ArrayLike) -> Array:
         """Return ``B(q)``, ``(n, n)``."""
-        n, at = self.manifold.size, self.manifold.point(q)
+        n, at = self.manifold.size, self.manifold.points(q).ravel()
         if not self.mobility_varies:
             return np.array(self.mobility_formulas.tolist(), dtype=np.float64)
         (values,) = self.mobilities.evaluate(at, order=0)

@@ -71,7 +71,7 @@ class Trajectory(Checked, Printed):
         them, ``(T, D)``: ``trajectory["large"]`` has those of one kind, ``(T, n, k)``.
     rests, present : (T, N) array of bool
         Which bodies are at rest on their substrate, and which have not left.
-    touching : tuple of T tuples
+    touching : sequence of T tuples
         Contacts that touch at each instant, and all equations: bodies, name, and the force, along
         the gradient of the gap or equation: its mean over the step before the instant, and at the
         start over the first step.
@@ -84,7 +84,8 @@ class Trajectory(Checked, Printed):
     work : mapping from str to (T,) array
         Work done until each instant by the moving ``substrate``, by ``applied`` forces and by
         ``noise``, by the ``drive`` of equations with the time, and what ``left`` with bodies that
-        left (negative).
+        left (negative).  Of a :class:`~polycorner.Drift` by the wished ``velocity`` and by
+        ``noise``; all of it is dissipated by ``drag``.
     events : sequence of Event
         In time.  They are held as arrays; each becomes an object when it is asked for.
     max_penetration : float
@@ -103,6 +104,9 @@ class Trajectory(Checked, Printed):
     last : State or None
         The last state.  ``simulate(path.system, path.last, t_end, dt)`` goes on bit for bit as one
         run would have, with accounts of work from zero.  Files do not have it.
+    splits : sequence of Split
+        Of a :class:`~polycorner.Drift` the concave corners that were met, with the states from
+        which the motion goes on beyond.  Files do not have them.
     """
 
     system: MechanicalSystem
@@ -112,7 +116,7 @@ class Trajectory(Checked, Printed):
     v: Array
     rests: NDArray[np.bool_]
     present: NDArray[np.bool_]
-    touching: tuple[tuple[Touch, ...], ...]
+    touching: Sequence[tuple[Touch, ...]]
     kinetic: Array
     potential: Array
     dissipated: Mapping[str, Array]
@@ -127,7 +131,7 @@ class Trajectory(Checked, Printed):
     steps_per_second: float = math.nan
     friction: FrictionTable = field(default_factory=FrictionTable)
     last: State | None = None
-    splits: tuple[Split, ...] = ()
+    splits: Sequence[Split] = ()
 
     def __len__(self) -> int:
         """Return the number of recorded instants."""

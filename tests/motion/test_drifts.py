@@ -325,6 +325,51 @@ def test_one_step_of_a_crowd_is_the_projection_of_its_wish():
     assert np.abs(d.value - (end - q)).max() < 1e-6
 
 
+def test_a_motion_does_not_depend_on_the_unit_of_length():
+    small = Manifold("x y", scales=[1e-3, 1e-3])
+    s = 1 / math.sqrt(2)
+    walls = Polyhedron(small, {"up": (6e-4 - X - Y) * s, "down": (6e-4 - X + Y) * s})
+    gap = sp.sqrt((X2 - X1) ** 2 + (Y2 - Y1) ** 2) - 4e-4
+    apart = ContactFamily({"apart": gap}, 0.4, ["x", "y"])
+    one = Drift(funnel(0.6), {"x": 1, "y": -Y}, count=9, between=discs(0.2))
+    two = Drift(walls, {"x": 1e-3, "y": -Y}, count=9, between=apart)
+    start = crowd(9, 0.2, 2)
+    ends = [
+        simulate(drift, drift.state(size * start), 1.5, 0.01).q[-1] / size
+        for drift, size in ((one, 1.0), (two, 1e-3))
+    ]
+    assert np.abs(ends[0] - ends[1]).max() < 1e-5
+
+
+def test_bodies_of_an_arrangement_drift_and_are_drawn():
+    from polycorner.bodies import Arrangement, HalfSpace, capsule
+    from polycorner.bodies import disc as round_body
+    from polycorner.pictures import film
+
+    walls = {"up": HalfSpace([-1, -1], [0.6, 0]), "down": HalfSpace([-1, 1], [0.6, 0])}
+    people = Arrangement({"person": round_body(0.2)}, walls)
+    system = people.system(count=2)
+    x, y = system.manifold.symbols
+    drift = Drift(
+        system.polyhedron, {x.name: 1, y.name: -y}, count=2, between=system.between,
+        scene=system.scene,
+    )  # fmt: skip
+    path = simulate(drift, drift.state([[-1.5, 0.3], [-1.5, -0.3]]), 3.0, 0.01)
+    assert path.q[-1, 0, 1] == pytest.approx(0.2, abs=1e-5)
+    assert {row.between for row in path.contacts(-1)} >= {("person 1", "up")}
+    assert film(people, path) is not None
+    rods = Arrangement(
+        {"rod": capsule([-0.3, 0], [0.3, 0], 0.1)}, {"floor": HalfSpace([0, 1], [0, 0])}
+    )
+    one = rods.system(count=2)
+    _, height, _ = one.manifold.names
+    sinks = Drift(one.polyhedron, {height: -1}, count=2, between=one.between, noise=1e-4)
+    path = simulate(sinks, sinks.state([[0, 1, 0.3], [0.1, 1.6, 0.2]]), 2.0, 0.01)
+    assert path.converged
+    assert path.q[-1, :, 1].max() < 1.0
+    assert one.polyhedron.values(path.q[-1]).min() > -1e-5
+
+
 def test_nothing_overlaps_in_a_crowd_and_who_passes_leaves():
     radius = 0.2
     drift = Drift(

@@ -5,8 +5,9 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
+import sympy as sp
 
-from polycorner import AllOf, AnyOf, Drift, Manifold, Polyhedron, simulate
+from polycorner import AllOf, AnyOf, Drift, Manifold, Polyhedron, System, simulate, velocities
 from polycorner.formulas import SmoothFunction
 from polycorner.models import Pinball
 from polycorner.motion import Checkpoint, EventKind, Noise
@@ -103,6 +104,17 @@ def test_splits_of_an_interrupted_run_are_kept(tmp_path):
         there.taken,
     )
     assert all((a.q == b.q).all() for a, b in zip(here.states, there.states, strict=True))
+
+
+def test_a_system_takes_a_union_as_one_contact():
+    """A ball bounces off the side of a roof that it meets, along the normal of that side."""
+    vx, vy = velocities(PLANE)
+    roof = SmoothFunction.quantity("roof", sp.Max(Y + X, Y - X), PLANE)
+    ball = System(Polyhedron(PLANE, [roof]), (vx**2 + vy**2) / 2, restitution=1.0)
+    for x in (0.3, -0.3):
+        path = simulate(ball, ball.state([x, 1.0], [0.0, -1.0]), 2.0, 0.01)
+        # it meets the roof at |x|, and goes off sideways
+        assert path.q[-1, 0] == pytest.approx([x + math.copysign(0.7, x), -0.3], abs=1e-9)
 
 
 def test_pieces_with_several_functions_hold_together():

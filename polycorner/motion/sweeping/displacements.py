@@ -61,8 +61,8 @@ def travel_of(s, w, low, high):
 
 @compiled
 def tolerance_of(s, st, w, low, high):
-    """Return to which length the programme of a step is solved."""
-    far = s.gap_unit
+    """Return to which scaled length the programme of a step is solved."""
+    far = 1.0
     for i in range(low, high):
         for c in range(s.k):
             far = max(far, abs(st.q[i, c]) * s.units[c])

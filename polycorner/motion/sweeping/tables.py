@@ -55,7 +55,6 @@ def system_values(
         "position": bodies.axes,
         "period": [*bodies.period, np.inf][:3],
         "units": body.units,
-        "gap_unit": body.gap_unit,
         "exit_coordinate": bodies.exit_coordinate,
         "exit_limit": bodies.exit_limit,
         "step": step,
@@ -63,11 +62,11 @@ def system_values(
         "tolerance": solver.tolerance,
         "rounding": DEFAULT.rounding,
         "sweeps": solver.sweeps,
-        "zero": options.zero_gap * body.gap_unit,
-        "touching": options.touching * body.gap_unit,
-        "parting": options.parting * body.gap_unit,
+        "zero": options.zero_gap,
+        "touching": options.touching,
+        "parting": options.parting,
         "shortest": options.shortest_part,
-        "detection": options.detection * body.gap_unit,
+        "detection": options.detection,
         "buffer": max(gaps["size"], energy["size"], (2 * k + 1) * (len(drift.limits) + 2)),
     }
 
