@@ -50,7 +50,7 @@ def test_tables_are_joined_one_after_the_other(cut):
 def test_what_is_read_has_kinds_and_contacts_that_there_are():
     arrays = event_table(EVENTS, NAMES)
     assert read_events(arrays, NAMES, 5) == EVENTS
-    for column, value in ((0, 7), (0, -1), (3, 3), (3, -2)):
+    for column, value in ((0, len(EventKind)), (0, -1), (3, 3), (3, -2)):
         damaged = arrays["event"].copy()
         damaged[1, column] = value
         with pytest.raises(ValueError, match=r"^event: expected"):
