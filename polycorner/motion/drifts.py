@@ -35,7 +35,7 @@ from polycorner.values import cached_property
 if TYPE_CHECKING:
     import sympy
 
-CROWD = Solver(1e-5, options=MotionOptions(zero_gap=1e-7, touching=1e-6, parting=1e-4))
+CROWD = Solver(1e-5, 20_000, options=MotionOptions(zero_gap=1e-7, touching=1e-6, parting=1e-4))
 
 
 @dataclass(frozen=True, eq=False)

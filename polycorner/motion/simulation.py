@@ -361,6 +361,8 @@ def _start_drift(
     if noise.chatter or noise.kicks:
         expected = "a seed alone for a Drift, whose noise is its own"
         refuse("noise", expected, noise, TypeError)
+    if solver.crowd_sweeps or solver.threads != 1 or not solver.refine:
+        refuse("solver", "tolerance, sweeps and options alone for a Drift", solver)
     begun = state.time if memory is None else memory.start
     engine = DriftEngine(drift, q, dt, start=begun, noise=noise, solver=solver)
     if memory is not None:

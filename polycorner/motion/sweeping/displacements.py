@@ -160,7 +160,9 @@ def predict(s, st, w, low, high, t, h):
         r = w.active[e]
         if not is_limit(s, r):
             w.shift[r] = w.before[r]
-    tolerance = tolerance_of(s, st, w, low, high)
+    # Only the middle of the step is taken from here, and forces to begin with.
+    rough = np.sqrt(s.tolerance) * travel_of(s, w, low, high)
+    tolerance = max(tolerance_of(s, st, w, low, high), rough)
     while True:
         solve(s, st, w, low, high, count, tolerance)
         more = violated(s, st, w, low, high, count, w.before, True)
