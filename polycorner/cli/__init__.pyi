@@ -1,4 +1,4 @@
-from .branches import Vary, branch_options, followed, report_branches
+from .branches import Asked, Vary, branch_options, followed, report_branches
 from .landscape import Telling, landscape_options, report_landscape, searched
 from .minima import report_minima, start_options
 from .options import (
@@ -35,6 +35,7 @@ from .search import RESUMING, Begin, SkeletonSearch, search_options
 
 __all__ = [
     "RESUMING",
+    "Asked",
     "Begin",
     "Command",
     "GroupedCommand",

@@ -10,10 +10,19 @@ import click
 
 from polycorner.cli.lazy import LazyGroup
 from polycorner.cli.options import examples, option, output_options
-from polycorner.cli.output import deliver, fail, shown, timed, working, write_answer, writing
+from polycorner.cli.output import (
+    deliver,
+    fail,
+    remark,
+    shown,
+    timed,
+    working,
+    write_answer,
+    writing,
+)
 
 if TYPE_CHECKING:
-    from polycorner.branches import Diagram, Hysteresis
+    from polycorner.branches import BranchProof, Diagram, Hysteresis
     from polycorner.minimisation import Certificate
     from polycorner.pictures.branches import Height
     from polycorner.polyhedra.symmetry import Symmetry
@@ -36,6 +45,13 @@ class Vary(NamedTuple):
     high: float
 
 
+class Asked(NamedTuple):
+    """What is asked for beside the diagram: the loop, and proofs."""
+
+    loop: bool
+    prove: bool
+
+
 @click.group(
     cls=LazyGroup,
     prefix="branches.",
@@ -49,17 +65,19 @@ def branches() -> None:
 
 
 def branch_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Add ``--vary``, ``--loop``, ``--max-arcs``, ``--seconds`` and the options of every answer.
+    """Add ``--vary``, ``--loop``, ``--prove``, ``--max-arcs``, ``--seconds`` and those of answers.
 
-    The command gets ``--vary`` as a :class:`Vary`, and the last two as ``limits``: those that were
-    given, as arguments of :func:`polycorner.branches.branches`.
+    The command gets ``--vary`` as a :class:`Vary`, the next two as ``asked``, and the last two as
+    ``limits``: those that were given, as arguments of :func:`polycorner.branches.branches`.
     """
 
     @wraps(function)
-    def command(vary: str, max_arcs: int | None, seconds: float | None, **own: Any) -> None:
+    def command(
+        vary: str, loop: bool, prove: bool, max_arcs: int | None, seconds: float | None, **own: Any
+    ) -> None:
         given = {"max_arcs": max_arcs, "max_seconds": seconds}
         limits = {name: value for name, value in given.items() if value is not None}
-        function(vary=read_vary(vary), limits=limits, **own)
+        function(vary=read_vary(vary), asked=Asked(loop, prove), limits=limits, **own)
 
     for add in (
         output_options,
@@ -70,6 +88,10 @@ def branch_options(function: Callable[..., None]) -> Callable[..., None]:
         option(
             "--max-arcs", type=click.IntRange(min=1), group="Search",
             help="Most arcs. [that of the library]",
+        ),
+        option(
+            "--prove", is_flag=True, group="Parameter",
+            help="Prove arcs and events, and that there are no others in a box of the file.",
         ),
         option(
             "--loop", is_flag=True, group="Parameter",
@@ -113,21 +135,29 @@ def report_branches(  # noqa: PLR0913 - what is told, and how
     chosen: Mapping[str, Any],
     found: "Diagram",
     *,
-    loop: bool,
+    asked: Asked,
     as_json: bool,
     out: Path | None,
     symmetry: "Symmetry | None" = None,
+    box: Any = None,
     height: "Height" = "",
     label: str = "",
 ) -> None:
-    """Print a diagram and write its files: the answer, the diagram itself and the figure.
+    """Print a diagram and write its files: the answer, the diagram itself, proof and figure.
 
-    ``height`` and ``label`` are those of :func:`~polycorner.pictures.draw_branches`.
+    ``height`` and ``label`` are those of :func:`~polycorner.pictures.draw_branches`, and ``box``
+    is that of :func:`~polycorner.branches.prove_branches`.
     """
-    from polycorner.branches import hysteresis
+    from polycorner.branches import hysteresis, prove_branches
 
-    way = None
-    if loop:
+    proof = way = None
+    if asked.prove:
+        with working("proving arcs and events", "arcs") as progress:
+            try:
+                proof = prove_branches(found, box=box, symmetry=symmetry, progress=progress)
+            except ValueError as error:
+                fail(f"--prove: {str(error).removeprefix('diagram: ')}")
+    if asked.loop:
         with working("following the loop", "legs") as progress:
             try:
                 way = hysteresis(found, symmetry=symmetry, progress=progress)
@@ -170,10 +200,17 @@ def report_branches(  # noqa: PLR0913 - what is told, and how
     if way is not None:
         answer["loop"] = _loop(way)
 
+    archives: list[Path] = []
+    if proof is not None:
+        answer["proof"] = _proof(proof)
+        if out is not None:
+            archives = _saved(proof, out / "branches.proof.zip", answer)
+
     def write() -> list[Path]:
         if out is None:
             return []
         from polycorner.files import save_diagram
+
         from polycorner.pictures import draw_branches, save
 
         with writing(out), timed("drawing"):
@@ -181,11 +218,34 @@ def report_branches(  # noqa: PLR0913 - what is told, and how
             return [
                 write_answer(answer, out, "branches.json"),
                 save_diagram(found, out / "saved_branches.json"),
+                *archives,
                 save(figure, out / "branches.png"),
             ]
 
-    sheets = [found.sheet, *([] if way is None else [way.sheet])]
+    sheets = [found.sheet, *(part.sheet for part in (proof, way) if part is not None)]
     deliver(answer, lambda: "\n\n".join(map(shown, sheets)), write, as_json=as_json)
+
+
+def _proof(proof: "BranchProof") -> dict[str, Any]:
+    return {
+        "word": proof.word,
+        "arcs": list(proof.arcs),
+        "events": list(proof.events),
+        proof.diagram.parameter: [list(sides) for sides in proof.parameters],
+        "searched": proof.searched,
+        "open": len(proof.open_boxes),
+    }
+
+
+def _saved(proof: "BranchProof", archive: Path, answer: dict[str, Any]) -> list[Path]:
+    """Save a proof for the checker, or note why there is no file of it."""
+    with writing(archive), working("checking the proof", "boxes") as progress:
+        try:
+            return [proof.save(archive, progress=progress)]
+        except ValueError as error:
+            answer["proof"]["not_saved"] = str(error)
+            remark(f"{archive.name} is not written: {error}")
+            return []
 
 
 def _loop(way: "Hysteresis") -> dict[str, Any]:

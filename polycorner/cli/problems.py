@@ -9,7 +9,7 @@ import click
 
 from polycorner.cli.atlas import STARTS, planar, skeletal
 from polycorner.cli.branches import WORDS as FOLLOWING
-from polycorner.cli.branches import Vary, branch_options, followed, report_branches
+from polycorner.cli.branches import Asked, Vary, branch_options, followed, report_branches
 from polycorner.cli.landscape import (
     FLAGS,
     Telling,
@@ -408,7 +408,7 @@ def _boxes(problem: "ProblemFile", file: Path) -> dict[str, Any]:
 )
 @branch_options
 def branches(
-    file: Path, chosen: tuple[str, ...], of: str, vary: Vary, limits: dict[str, Any], loop: bool,
+    file: Path, chosen: tuple[str, ...], of: str, vary: Vary, asked: Asked, limits: dict[str, Any],
     as_json: bool, out: Path | None,
 ) -> None:  # fmt: skip
     """Follow the equilibria of the problem in FILE while a parameter of it varies.
@@ -440,7 +440,14 @@ def branches(
                  f" {vary.low:g}:{vary.high:g}")  # fmt: skip
         found = followed(starts, vary.name, vary[1:], progress=progress, **limits)
     about = {"file": str(file)}
-    report_branches(file.stem, about, found, loop=loop, as_json=as_json, out=out, height=of)
+    box = (
+        None
+        if None in problem.box
+        else dict(zip(problem.polyhedron.manifold.names, problem.box, strict=True))
+    )
+    report_branches(
+        file.stem, about, found, asked=asked, as_json=as_json, out=out, box=box, height=of
+    )
 
 
 # -------------------------------------------------------------------------------------------- view

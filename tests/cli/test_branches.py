@@ -59,6 +59,50 @@ def test_a_truss_snaps_through(capsys, truss, tmp_path):
     assert len(load_diagram(out / "saved_branches.json").arcs) == len(found["arcs"])
 
 
+SPRING = """
+inequalities.wall = "x >= 0"
+parameters.load = 0.5
+points.begin = [0.6]
+coordinates = [{names = "x", box = [-1, 2]}]
+
+[energy]
+minimise = "x**2/2 - load*x"
+"""
+
+
+def test_a_diagram_is_proved_and_verified(capsys, tmp_path):
+    """A spring is pulled off a wall at ``load = 0``; there is nothing else in the box."""
+    path, out = tmp_path / "spring.toml", tmp_path / "out"
+    path.write_text(SPRING)
+    options = ("--vary", "load=-1:1", "--prove", "--out", str(out))
+    found = commands.answer(capsys, "branches", str(path), *options)
+    proof = found["proof"]
+    assert (proof["word"], proof["searched"], proof["open"]) == ("complete", True, 0)
+    assert not any(proof["arcs"] + proof["events"])
+    (k,) = [k for k, event in enumerate(found["events"]) if event["kind"] in ("opens", "closes")]
+    low, high = proof["load"][k]
+    assert low <= 0 <= high
+    code, told, _ = commands.run(capsys, "verify", str(out / "branches.proof.zip"))
+    assert code == 0
+    assert told.startswith("verified: equilibria over load from -1.0 to 1.0")
+
+
+def test_a_diagram_that_is_not_proved_has_no_file(capsys, tmp_path):
+    path, out = tmp_path / "pitchfork.toml", tmp_path / "out"
+    path.write_text(SPRING.replace("x**2/2 - load*x", "x**4/4 - load*x**2/2").replace(
+        'inequalities.wall = "x >= 0"', 'inequalities.wall = "x >= -3"'
+    ))  # fmt: skip
+    options = ("--vary", "load=-1:1", "--prove", "--out", str(out))
+    code, answer, remarks = commands.run(capsys, "branches", str(path), *options, "--json")
+    assert code == 0
+    assert "branches.proof.zip is not written" in remarks
+    proof = json.loads(answer)["proof"]
+    assert proof["word"] == "followed"
+    assert any(proof["events"])
+    assert "expected a diagram of which all arcs and events are proved" in proof["not_saved"]
+    assert not (out / "branches.proof.zip").exists()
+
+
 def test_tables(capsys, truss):
     code, out, _ = commands.run(capsys, "branches", truss, "--vary", "load=-0.1:0.1")
     assert code == 0

@@ -353,6 +353,7 @@ CALLS = {
         "box": of.UNIT,
     },
     "Proof.save": lambda: {"path": of.new("proof.zip")},
+    "BranchProof.save": lambda: {"path": of.new("diagram.zip")},
     "exact_point": lambda: {"polyhedron": of.square(), "point": ORIGIN},
     "Proof.enclose": lambda: {"expression": of.X + of.Y},
     "CornerList.save": lambda: {"path": of.new("corners.zip")},

@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from polycorner.cli import (
+    Asked,
     GroupedCommand,
     Vary,
     branch_options,
@@ -39,7 +40,7 @@ RATES = {
 @pair_options
 @branch_options
 def dyad(
-    vary: Vary, limits: dict[str, Any], loop: bool, as_json: bool, out: Path | None,
+    vary: Vary, asked: Asked, limits: dict[str, Any], as_json: bool, out: Path | None,
     **options: float,
 ) -> None:  # fmt: skip
     """Follow the right-handed dyad while length, ball, rod, drum or rod-weight varies.
@@ -82,6 +83,6 @@ def dyad(
         return float(np.degrees(pair.heading(q)[0]))
 
     report_branches(
-        "dyad", parameters(pair), found, loop=loop, as_json=as_json, out=out, symmetry=symmetry,
+        "dyad", parameters(pair), found, asked=asked, as_json=as_json, out=out, symmetry=symmetry,
         height=heading, label="heading of dumbbell A (degrees)",
     )  # fmt: skip
