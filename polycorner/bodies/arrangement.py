@@ -49,6 +49,7 @@ from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.assembly import Assembly
 from polycorner.motion.hulls.contacts import HullContacts
+from polycorner.motion.limits import rate_limits
 from polycorner.motion.system import System
 from polycorner.motion.ties import Tie
 from polycorner.polyhedra.groups import AllOf
@@ -303,6 +304,9 @@ class Arrangement(Checked, Printed):
         joints: Mapping[str, Any] | None = None,
         drives: Mapping[str, Drive] | None = None,
         forces: Mapping[str, Any] | None = None,
+        rates: Mapping[str, float] | None = None,
+        limits: Mapping[str, Any] | None = None,
+        nonholonomic: Mapping[str, Any] | None = None,
     ) -> System | Assembly:
         """Return the mechanical system of the bodies.
 
@@ -349,6 +353,13 @@ class Arrangement(Checked, Printed):
             For a body the components of a force at its origin, ``d`` of them, or with those of a
             torque 3 in the plane and 6 in space, in the axes of space: functions of coordinates,
             velocities and the time.
+        rates : mapping from str to float, optional
+            Largest rates of joints of the arrangement by name, in radians or lengths per second:
+            limits called ``"joint.rate"``.
+        limits, nonholonomic : mapping from str to sympy.Expr, optional
+            Limits on velocities, and equations, as in :class:`~polycorner.System`, of the
+            coordinates of the arrangement; :meth:`joint_rate` helps.  Not where ``count`` has
+            names.
 
         Notes
         -----
@@ -378,6 +389,7 @@ class Arrangement(Checked, Printed):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
+        limited = self._limited(count, rates, limits, nonholonomic)
         if isinstance(count, Mapping):
             check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
             alone = {p: self._alone(p) for p in self.placements}
@@ -432,13 +444,15 @@ class Arrangement(Checked, Printed):
             family = between((first, first), self.lattice, known)
         placed = self._joined(self.contacts(excluded=False, sharp=False))
         rubbing = tuple(rubbing_hulls(one, pair[0], pair[1], known) for one, pair in hulls)
-        every = [*placed.names, *(name for one in rubbing for name in one.names)]
         return System(
             placed,
             *laws,
             friction_of(self.manifold, touches, self.at_walls, known.friction, known.rolling)
             + moved,
-            restitution={name: known.restitution.get(name, 0.0) for name in every},
+            restitution={
+                name: known.restitution.get(name, 0.0)
+                for name in chain(placed.names, *(one.names for one in rubbing))
+            },
             count=count,
             between=family,
             exits={} if exits is None else exits,
@@ -455,6 +469,7 @@ class Arrangement(Checked, Printed):
             ),
             ties=bouncing(ties, known.restitution),
             impact=impact,
+            **limited,
         )
 
     def _further(self, joints: Any) -> dict[str, AnyJoint]:
@@ -541,6 +556,24 @@ class Arrangement(Checked, Printed):
     def joint_function(self, name: str) -> "sympy.Expr":
         """Return the angle of a joint, in radians up to half a turn, or its position: a formula."""
         return self.mechanism.coordinate(checks.instance("name", name, str), "name").value()
+
+    def _limited(
+        self,
+        count: int | Mapping[str, int],
+        rates: Mapping[str, float] | None,
+        limits: Mapping[str, Any] | None,
+        nonholonomic: Mapping[str, Any] | None,
+    ) -> dict[str, Any]:
+        """Return the arguments of a system for limits on velocities."""
+        bounds = checks.mapping("rates", {} if rates is None else rates)
+        checks.names("rates", bounds, self.joints)
+        turning = {name: self.joint_rate(name) for name in bounds}
+        further = checks.mapping("limits", {} if limits is None else limits)
+        given = {**rate_limits(turning, bounds), **further}
+        equations = checks.mapping("nonholonomic", {} if nonholonomic is None else nonholonomic)
+        if isinstance(count, Mapping) and (given or equations):
+            refuse("limits", "none where count has names", [*given, *equations])
+        return {"limits": given, "nonholonomic": equations}
 
     def joint_rate(self, name: str) -> "sympy.Expr":
         """Return the rate of a joint's angle or position as a formula, in the velocities too."""

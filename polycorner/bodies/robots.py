@@ -38,6 +38,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.motion.contacts import Friction, velocities
 from polycorner.motion.friction import Disc
+from polycorner.motion.limits import rate_limits
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -381,7 +382,7 @@ class Robot(Checked):
 
     # ------------------------------------------------------------------------------------ motion
 
-    def system(
+    def system(  # noqa: PLR0913 - all are options
         self,
         *,
         gravity: ArrayLike | None = None,
@@ -391,6 +392,9 @@ class Robot(Checked):
         friction: float | Mapping[str, float] = 0.0,
         restitution: float | Mapping[str, float] = 0.0,
         impact: str = "poisson",
+        rates: Mapping[str, float] | None = None,
+        limits: "Mapping[str, sympy.Expr] | None" = None,
+        nonholonomic: "Mapping[str, sympy.Expr] | None" = None,
     ) -> System:
         """Return the mechanical system of links and bodies.
 
@@ -411,6 +415,11 @@ class Robot(Checked):
             Coulomb's coefficient at walls, for all or by wall; half-spaces only.
         restitution, impact : optional
             As in :class:`~polycorner.System`.
+        rates : mapping from str to float, optional
+            Largest rates of joints by name, in radians or lengths per second: limits called
+            ``"joint.rate"``.
+        limits, nonholonomic : mapping from str to sympy.Expr, optional
+            Limits on velocities, and equations, as in :class:`~polycorner.System`.
 
         Raises
         ------
@@ -448,8 +457,19 @@ class Robot(Checked):
         checks.names("torques", given, self._tree.free)
         driven = link_laws.forces(self.joints, self._rates, given)
         laws = (*link_laws.joint_friction(self.joints, self._rates), *self._wall_friction(friction))
+        bounds = checks.mapping("rates", {} if rates is None else rates)
+        moving = {name: self._rates[name] for name in self._tree.free}
+        further = checks.mapping("limits", {} if limits is None else limits)
         return System(
-            polyhedron, kinetic, potential, driven, laws, restitution=restitution, impact=impact
+            polyhedron,
+            kinetic,
+            potential,
+            driven,
+            laws,
+            restitution=restitution,
+            impact=impact,
+            limits={**rate_limits(moving, bounds), **further},
+            nonholonomic={} if nonholonomic is None else nonholonomic,
         )
 
     def _wall_friction(self, given: float | Mapping[str, float]) -> Iterator[Friction]:

@@ -24,6 +24,7 @@ from .splits import Split
 from .system import System
 from .ties import Tie
 from .trajectory import MotionOfKind, Trajectory, contact_forces
+from .viability import SpeedZones
 
 __all__ = [
     "Accelerations",
@@ -49,6 +50,7 @@ __all__ = [
     "Noise",
     "PairFriction",
     "Solver",
+    "SpeedZones",
     "Split",
     "State",
     "System",

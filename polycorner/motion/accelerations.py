@@ -111,6 +111,8 @@ def accelerations(system: System, state: State) -> Accelerations:
         refuse("system", expected, system.hulls[0].names[0], NotImplementedError)
     if system.ties:
         refuse("system", "one without ties", [tie.name for tie in system.ties])
+    if limited := [*system.limits, *system.nonholonomic]:
+        refuse("system", "one without limits on velocities", limited, NotImplementedError)
     problem = _Problem.of(system, state)
     found: list[tuple[Array, Array]] = []
     several = False

@@ -14,6 +14,7 @@ from polycorner.motion.bodies import IdenticalBodies, PairContacts, SeveralKinds
 from polycorner.motion.contacts import ContactFamily, periods_of, position_of
 from polycorner.motion.formulation import energies
 from polycorner.motion.hulls.contacts import HullContacts
+from polycorner.motion.limits import check_limited
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.placements import (
     check_contacts,
@@ -234,6 +235,9 @@ class Assembly(MechanicalSystem):
             check_velocities(kind.polyhedron, each[name], moved[name], self._called(name))
             sticks.append(kind.sticks(each[name], moved[name]).ravel())
         time = real("time", time, unit="s")
+        for name, kind in self.kinds.items():
+            known = kind.velocity_limits, kind.manifold.scale_array
+            check_limited(*known, each[name], moved[name], time, self._called(name))
         check_ties(self.bodies, self.bodies.padded(places), self.bodies.padded(speeds), time)
         return State(time, places, speeds, np.concatenate(sticks))
 

@@ -53,6 +53,32 @@ class FrictionContact(Value):
 
 
 @dataclass(frozen=True, eq=False)
+class BodyLimits(Value):
+    """Limits on the velocities of a body, compiled.
+
+    Attributes
+    ----------
+    rows : Family
+        ``f(q, v, t)``: limits ``f >= 0``, then nonholonomic equations ``f = 0``; variables are the
+        coordinates, the velocities and the time.
+    equations : int
+        Number of the equations.
+    timed, curved : bool
+        Whether any depends on the time, and whether any is not affine in the velocities.
+    """
+
+    rows: Family
+    equations: int
+    timed: bool
+    curved: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of limits and equations."""
+        return self.rows.names
+
+
+@dataclass(frozen=True, eq=False)
 class MovingBody(Value):
     """One body, or a whole system that is not repeated.
 
@@ -85,6 +111,8 @@ class MovingBody(Value):
     slow_signals : bool
         Whether they change as slowly as the substrate carries bodies, so that a body at rest need
         not be examined in every step.
+    limits : BodyLimits, optional
+        Limits on its velocities.
     """
 
     formulation: Formulation
@@ -100,6 +128,12 @@ class MovingBody(Value):
     signals: Family | None = None
     signal_parameters: Array = field(default_factory=lambda: np.empty(0))
     slow_signals: bool = False
+    limits: BodyLimits | None = None
+
+    @property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of the limits on its velocities, and of the nonholonomic equations."""
+        return () if self.limits is None else self.limits.names
 
     @property
     def timed(self) -> bool:
@@ -298,10 +332,15 @@ class MovingBodies(Value):
 
     @cached_property
     def contact_names(self) -> tuple[str, ...]:
-        """Names of all contacts: of bodies with their surroundings, of pairs, then of ties."""
+        """Names of all contacts: of bodies with their surroundings, of pairs, ties, then limits."""
         own = [name for kind in self.kinds for name in kind.body.contacts]
         pairs = [name for family in self.families.values() for name in family.gaps.names]
-        return tuple(dict.fromkeys((*own, *pairs, *self.ties.names)))
+        return tuple(dict.fromkeys((*own, *pairs, *self.ties.names, *self.limit_names)))
+
+    @cached_property
+    def limit_names(self) -> tuple[str, ...]:
+        """Names of all limits on velocities, each once: causes under which work is booked."""
+        return tuple(dict.fromkeys(n for kind in self.kinds for n in kind.body.limit_names))
 
     @property
     def formula_keys(self) -> list[str]:
@@ -313,6 +352,7 @@ class MovingBodies(Value):
             if body.signals is not None:
                 found.append(f"{body.signals.key} {body.signal_parameters.tolist()}")
             found += [f"{call.family.key} {call.parameters.tolist()}" for call in body.gaps]
+            found += [] if body.limits is None else [body.limits.rows.identity]
         for contacts in self.families.values():
             found += [contacts.gaps.key, *(family.key for family, _, _ in contacts.slips)]
         for form in self.ties.forms:

@@ -23,6 +23,8 @@ class EventKind(IntEnum):
     EXIT = 5
     FAILED = 6
     SPLIT = 7
+    ACTED = 8
+    CEASED = 9
 
     @property
     def sentence(self) -> str:
@@ -37,28 +39,33 @@ _SENTENCES = {
     EventKind.REST: "a body came to rest on its substrate",
     EventKind.MOTION: "a body began to move",
     EventKind.EXIT: "a body left",
-    EventKind.FAILED: "a contact was not solved to the tolerance, in however short a step",
     EventKind.SPLIT: "a concave corner was met, beyond which the motion has several continuations",
+    EventKind.FAILED: "contacts and limits were not solved to the tolerance, in however short a "
+    "step; limits may admit no velocity together",
+    EventKind.ACTED: "a limit on velocities began to act",
+    EventKind.CEASED: "a limit on velocities ceased to act",
 }
 
 
 @dataclass(frozen=True)
 class Event(Checked):
-    """An event: a contact, the rest or the exit of bodies at a time.
+    """An event: a contact, a limit, the rest or the exit of bodies at a time.
 
     Attributes
     ----------
     time : float
-        For a contact that closes, the moment at which the gap vanishes; for one that opens, that
-        at which its force vanishes; otherwise the end or, where motion begins, the start of the
-        step, and its middle where an island is not solved to the tolerance.
+        For a contact that closes, the moment at which the gap vanishes, and so for a limit on
+        velocities; for one that opens, or ceases, that at which its force vanishes; otherwise the
+        end or, where motion begins, the start of the step, and its middle where an island is not
+        solved to the tolerance.
     kind : EventKind
     bodies : tuple of int
         Number of the body, or of both.
     contact : str
-        Name of the contact, or empty.
+        Name of the contact or limit, or empty.
     impulse : float
-        Normal impulse in that step, for contacts.
+        Normal impulse in that step, for contacts; for limits on velocities along scaled gradients
+        of length 1.
     """
 
     time: float

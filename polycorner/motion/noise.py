@@ -27,7 +27,7 @@ class MotionOptions(Checked):
         Depth to which a gap may close by its curvature within a step.
     slow_travel, slow_travel_kicked, slow_bounce : float
         Travel in a step up to which an impact is slow, so that it need not be located: a plastic
-        one, without and with random impulses, and one that bounces.
+        one, also of a limit on velocities, without and with random impulses, and one that bounces.
     crowd_travel : float
         The same for a plastic impact in a crowd, over the reach of bodies.
     crowd_overlap : float

@@ -38,9 +38,13 @@ if TYPE_CHECKING:
 
     from polycorner.motion.mechanics import MechanicalSystem
 
-FLAGS = ("sticks", "touches", "alive", "rests", "asleep", "watched", "tie_touches", "tie_sticks")
+FLAGS = (
+    *("sticks", "touches", "alive", "rests", "asleep", "watched"),
+    *("tie_touches", "tie_sticks", "limit_acts"),
+)
 TIES = {name for name in EngineState._fields if name.startswith("tie_")}
-NOW = {"rank", "body_of_rank", *TIES}  # not in states saved before bodies had ranks, or ties
+LIMITS = {name for name in EngineState._fields if name.startswith("limit_")}
+NOW = {"rank", "body_of_rank", *TIES, *LIMITS}  # not in states saved before there were these
 WORK = {"substrate": SUBSTRATE_WORK, "applied": APPLIED_WORK, "noise": NOISE_WORK}
 
 
@@ -67,7 +71,8 @@ def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
         "elapsed": (0.0, engine.dt),
     }
     for name, declared in declarations(EngineState).items():
-        if name in NOW - arrays.keys() and (name not in TIES or not bodies.ties.bodies):
+        needed = (name in TIES and bodies.ties.bodies) or (name in LIMITS and bodies.limit_names)
+        if name in NOW - arrays.keys() and not needed:
             continue
         kind = "f" if declared.kind is np.float64 else "i"
         least, most = ranges.get(name, (-np.inf, np.inf))
@@ -260,6 +265,8 @@ class Recorder:
         if any(kind.body.timed for kind in bodies.kinds) or bodies.ties.drives:
             work["drive"] = sums[:, DRIVE_WORK]
         dissipated = {cause: sums[:, DISSIPATED + i] for i, cause in enumerate(bodies.causes)}
+        first = DISSIPATED + len(bodies.causes)
+        work |= {name: sums[:, first + j] for j, name in enumerate(bodies.limit_names)}
         deepest = float(self.engine.motion.sums[PENETRATION])
         return self._trajectory(system, dissipated, work, deepest, **run)
 

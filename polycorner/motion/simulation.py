@@ -40,6 +40,12 @@ SHAKE, symmetric and symplectic where forces have a potential and masses are con
 VII.1).  Where a step is shorter than the one before, or the first, ``q_M`` is moved onto the
 equations.  Of equations that follow from others, the later ones carry no force.
 
+A limit on velocities ``f(q, v, t) >= 0`` has the row ``J = df/dv`` at ``q_M`` and the mean
+velocity, and an impulse ``p >= 0`` with ``p f = 0`` at ``q_M + h v+ / 2``, ``v+`` and the end of
+the step; where it falls by a step, this is located, and the velocity projected onto it in the
+metric of the masses.  A nonholonomic equation ``f = 0`` holds at ``q_M`` and the mean velocity, so
+that it does no work ([MP]).
+
 Slip that reverses within a step was zero within it, and there it is the static set that decides
 whether it starts again: such a step is solved anew with the static set.
 

@@ -14,7 +14,13 @@ from polycorner.formulas.bundles import Call
 from polycorner.formulas.expressions import as_expression, as_expressions, written
 from polycorner.formulas.families import Family
 from polycorner.kinds import check_fields, checked
-from polycorner.motion.bodies import IMPACT_LAWS, FrictionContact, IdenticalBodies, MovingBody
+from polycorner.motion.bodies import (
+    IMPACT_LAWS,
+    BodyLimits,
+    FrictionContact,
+    IdenticalBodies,
+    MovingBody,
+)
 from polycorner.motion.contacts import (
     ContactFamily,
     Friction,
@@ -33,6 +39,7 @@ from polycorner.motion.formulation import (
     highest_square,
 )
 from polycorner.motion.hulls.contacts import HullContacts, beside
+from polycorner.motion.limits import check_limited, compiled_limits, described_limits
 from polycorner.motion.mechanics import MechanicalSystem, State
 from polycorner.motion.noise import OPTIONS
 from polycorner.motion.placements import (
@@ -109,6 +116,15 @@ class System(MechanicalSystem, Printed):
         the gradient by the coordinates; their work is ``Trajectory.work["drive"]``.
     ties : sequence of Tie, optional
         Joints, limits, springs and drives between two of the bodies, or of one and the world.
+    limits : mapping from str to sympy.Expr, optional
+        Limits on velocities ``f(q, v, t) >= 0`` of each body, functions of coordinates,
+        :func:`velocities` and the time that are affine or concave in the velocities.  The force is
+        ``p df/dv`` with ``p >= 0``, and acts where ``f = 0``; a velocity beyond a limit, as where
+        this falls by a step, jumps onto it by a plastic impact.  Their work is
+        ``Trajectory.work`` by their names.
+    nonholonomic : mapping from str to sympy.Expr, optional
+        Equations ``f(q, v, t) = 0``, affine in the velocities, such as that of a skate; the force
+        ``p df/dv`` has either sign.
 
     Raises
     ------
@@ -151,6 +167,8 @@ class System(MechanicalSystem, Printed):
     rheonomic: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
     ties: tuple[Tie, ...] = ()
     impact: str = IMPACT_LAWS[0]
+    limits: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
+    nonholonomic: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return the bodies, and the numbers of coordinates, contacts and laws of friction."""
@@ -175,6 +193,8 @@ class System(MechanicalSystem, Printed):
             ("substrate", few(f"{name} at {x:g}" for name, x in self.substrate.items())),
             ("exits", few(f"{name} > {x:g}" for name, x in self.exits.items())),
             ("law of impact", self.impact if self.bodies.bounces else ""),
+            ("limits on velocities", few(self.limits)),
+            ("nonholonomic equations", few(self.nonholonomic)),
         ]
         pairs = self.bodies.contacts if self.count > 1 else None
         contacts = listed(
@@ -198,7 +218,7 @@ class System(MechanicalSystem, Printed):
     def __post_init__(self) -> None:
         object.__setattr__(self, "kinetic", as_expression("kinetic", self.kinetic))
         object.__setattr__(self, "potential", as_expression("potential", self.potential))
-        for argument in ("forces", "rheonomic"):
+        for argument in ("forces", "rheonomic", "limits", "nonholonomic"):
             given = as_expressions(argument, getattr(self, argument))
             object.__setattr__(self, argument, given)
         check_fields(self)
@@ -226,7 +246,7 @@ class System(MechanicalSystem, Printed):
         self._check_single("substrate")
         self._check_single("exits")
         self._check_ties()
-        _ = self.restitutions, self.formulation, self.bodies
+        _ = self.restitutions, self.formulation, self.velocity_limits, self.bodies
         super().__post_init__()
 
     def _check_ties(self) -> None:
@@ -269,6 +289,12 @@ class System(MechanicalSystem, Printed):
     def followed(self) -> Family:
         """The equations with the time, functions of the coordinates and of it."""
         return Family.of(self.rheonomic, (*self.manifold.names, TIME))
+
+    @cached_property
+    def velocity_limits(self) -> BodyLimits | None:
+        """The compiled limits on velocities, then the nonholonomic equations; None without any."""
+        called = (*self._normals, *(f.name for f in self.friction))
+        return compiled_limits(self.manifold, self.limits, self.nonholonomic, called)
 
     @cached_property
     def restitutions(self) -> Array:
@@ -338,6 +364,7 @@ class System(MechanicalSystem, Printed):
             gap_unit(self.manifold),
             equations,
             np.empty(0) if self.scene is None else self.scene.lever,
+            limits=self.velocity_limits,
         )
         between = self.between if self.count > 1 else None
         given = () if self.between is None else self.between.position
@@ -404,6 +431,8 @@ class System(MechanicalSystem, Printed):
         if self.rheonomic:
             scales = self.manifold.scale_array
             check_followed(self.followed, scales, places, speeds, time, self.bodies.called)
+        known = self.velocity_limits, self.manifold.scale_array
+        check_limited(*known, places, speeds, time, self.bodies.called)
         check_ties(self.bodies, places.reshape(shape), speeds.reshape(shape), time)
         return State(time, places, speeds, self.sticks(places, speeds, time))
 
@@ -502,6 +531,7 @@ class System(MechanicalSystem, Printed):
             }
             for f in self.friction
         }
+        told |= dict(described_limits(self.limits, self.nonholonomic, written))
         if between is not None:
             told |= between.described()
         if self.hulls:

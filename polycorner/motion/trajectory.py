@@ -74,7 +74,8 @@ class Trajectory(Checked, Printed):
     touching : sequence of T tuples
         Contacts that touch at each instant, and all equations: bodies, name, and the force, along
         the gradient of the gap or equation: its mean over the step before the instant, and at the
-        start over the first step.
+        start over the first step.  Limits on velocities that act, and nonholonomic equations: the
+        force is along the gradient by the velocities.
     friction : FrictionTable
         The forces of friction at these contacts; :meth:`contacts` lists them.
     kinetic, potential : (T,) array
@@ -83,9 +84,10 @@ class Trajectory(Checked, Printed):
         Energy lost until each instant, by cause: ``impact`` and the kinds of friction.
     work : mapping from str to (T,) array
         Work done until each instant by the moving ``substrate``, by ``applied`` forces and by
-        ``noise``, by the ``drive`` of equations with the time, and what ``left`` with bodies that
-        left (negative).  Of a :class:`~polycorner.Drift` by the wished ``velocity`` and by
-        ``noise``; all of it is dissipated by ``drag``.
+        ``noise``, by the ``drive`` of equations with the time, by each limit on velocities and each
+        nonholonomic equation, by its name, and what ``left`` with bodies that left (negative).  Of
+        a :class:`~polycorner.Drift` by the wished ``velocity`` and by ``noise``; all of it is
+        dissipated by ``drag``.
     events : sequence of Event
         In time.  They are held as arrays; each becomes an object when it is asked for.
     max_penetration : float

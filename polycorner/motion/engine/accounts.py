@@ -5,6 +5,7 @@ from polycorner.motion.engine.arrays import (
     DISSIPATED,
     DRIVE_WORK,
     NOISE_WORK,
+    OWN_LIMIT,
     PAIR_FRICTION,
     PENETRATION,
     SUBSTRATE_WORK,
@@ -19,6 +20,11 @@ from polycorner.motion.engine.jit import compiled
 def book_block(model, body, tie, block, b, sums):
     """Book the work of a block."""
     if not takes_part(body, block, b):
+        return
+    if block.origin[b, 0] == OWN_LIMIT:
+        after = block.after[b, 0] - block.offset[b, 0]
+        account = model.limit_accounts[block.origin[b, 2]]
+        sums[account] += block.impulse[b, 0] * 0.5 * (block.before[b, 0] + after)
         return
     if block.rows[b] == 0:
         # What an equation with the time does, at the mean velocity; others do no work.

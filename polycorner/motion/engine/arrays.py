@@ -19,7 +19,7 @@ SUBSTRATE_WORK, APPLIED_WORK, NOISE_WORK, DRIVE_WORK, PENETRATION, RESIDUAL, DIS
 
 # Kinds of blocks: contacts with the surroundings, and contacts between bodies; limits and equations
 # of ties, and their friction.
-OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION, TIE_GAP, TIE_FRICTION = range(6)
+OWN_GAP, OWN_FRICTION, PAIR_GAP, PAIR_FRICTION, TIE_GAP, TIE_FRICTION, OWN_LIMIT = range(7)
 
 # Of a form of ties: kernels of its rows, slips and forces, or 0; limits, rows, slips; whether its
 # equations follow the time.
@@ -208,6 +208,13 @@ class Model(NamedTuple):
     component_rests: Annotated[Any, whole("*")]  # whether nothing in it depends on the time
     apart_start: Annotated[Any, whole("N+1")]  # bodies with which each has no contact
     apart_from: Annotated[Any, whole("*")]
+    limits: Annotated[Any, whole()]  # LU: on velocities, of all bodies, with their equations
+    limit_kernel: Annotated[Any, whole("A")]  # address: of coordinates, velocities and the time
+    limit_bends: Annotated[Any, whole("A")]  # the same with second derivatives; 0: all are affine
+    first_limit: Annotated[Any, whole("N+1")]  # of each body's limits
+    first_nonholonomic: Annotated[Any, whole("N")]  # of them that is an equation, as further ones
+    limit_names: Annotated[Any, whole("LU")]  # numbers in events, as those of ties
+    limit_accounts: Annotated[Any, whole("LU")]  # place of its work among the sums
 
 
 class EngineState(NamedTuple):
@@ -247,6 +254,10 @@ class EngineState(NamedTuple):
     tie_release: Annotated[Any, real("TU")]
     tie_friction: Annotated[Any, real("TX 2")]
     tie_sticks: Annotated[Any, whole("TX")]
+    limit_acts: Annotated[Any, whole("LU")]  # whether a limit on velocities acts
+    limit_force: Annotated[Any, real("LU")]  # its multiplier, times a whole step
+    limit_before: Annotated[Any, real("LU")]  # the same before the last step
+    limit_release: Annotated[Any, real("LU")]  # when it would vanish, as it fell last
 
 
 class MannerWork(NamedTuple):
@@ -273,6 +284,17 @@ class MidpointWork(NamedTuple):
     gap: Annotated[Any, real("U", initial=np.inf)]
     gradient: Annotated[Any, real("U K")]  # of the gaps
     mass: Annotated[Any, real("N k K")]
+
+
+class LimitWork(NamedTuple):
+    """Limits on velocities in the step."""
+
+    time: Annotated[Any, real("1")]  # of the midpoint
+    wanted: Annotated[Any, whole("LU")]  # whether one that did not act would be passed
+    block_of: Annotated[Any, whole("LU")]  # block of each, or -1
+    landing: Annotated[Any, real("N K")]  # where an impact projects a velocity onto a limit
+    row: Annotated[Any, real("LU K")]  # gradient by scaled velocities, of length 1
+    holds: Annotated[Any, whole("LU")]  # whether one that acts lets a body be at rest, and no less
 
 
 class VelocityWork(NamedTuple):
@@ -392,7 +414,7 @@ class BlockWork(NamedTuple):
     pressing: Annotated[Any, whole("B")]  # block of the contact that presses, or -1
     set: Annotated[Any, whole("B")]  # set of admissible friction
     origin: Annotated[Any, whole("B 4")]  # kind, body or contact, gap or friction; touches
-    load: Annotated[Any, real("B")]  # known load; of a gap, how much its curvature closes it
+    load: Annotated[Any, real("B")]  # known load; how much curvature closes a gap; |J| of a limit
     bound: Annotated[Any, whole("B")]  # of a gap: PLAIN, SMALL or BENT
     offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
     before: Annotated[Any, real("B 2")]  # J v before the step
@@ -530,6 +552,7 @@ class Work(NamedTuple):
     neighbours: NeighbourWork
     pair: PairWork
     tie: TieWork
+    limit: LimitWork
     block: BlockWork
     event: EventWork
     search: SearchWork

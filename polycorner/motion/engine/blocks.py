@@ -6,6 +6,7 @@ from polycorner.formulas.compilation import call_kernel, never_inline
 from polycorner.motion.engine.arrays import (
     OWN_FRICTION,
     OWN_GAP,
+    OWN_LIMIT,
     PAIR_FRICTION,
     PAIR_GAP,
     PLAIN,
@@ -402,7 +403,8 @@ def renew_blocks(model, state, work, blocks, h):
         for r in range(max(1, block.rows[b])):
             at = row_at(model, b, r)
             block.free[b, r] = row_times(model, block.jacobian, at, velocity.free, i, j)
-        if block.rows[b] == 0 and not block.bilateral[b]:
+        limits = block.origin[b, 0] == OWN_LIMIT  # corrected by themselves
+        if block.rows[b] == 0 and not (block.bilateral[b] or limits):
             least = least_velocity_of(
                 model, state, manner, mid, pair, work.tie, block, b, former, h
             )

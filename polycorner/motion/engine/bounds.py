@@ -5,6 +5,7 @@ from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 
 INSTANT = 1e-9  # of a step: the shortest part, for an impact
+BRIEF = 4.0 * INSTANT  # of a step: parts whose impulses say nothing about the forces that follow
 
 
 @compiled

@@ -6,20 +6,23 @@ from polycorner.motion.engine.arrays import (
     CONTACTS,
     OWN_FRICTION,
     OWN_GAP,
+    OWN_LIMIT,
     PAIR_GAP,
     PENETRATION,
     TIE_FRICTION,
     TIE_GAP,
 )
-from polycorner.motion.engine.bounds import INSTANT, contact_of, will_bounce
+from polycorner.motion.engine.bounds import BRIEF, contact_of, will_bounce
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.limits import evaluate_limits, limit_value
 from polycorner.motion.engine.neighbours import bodies_of, key_of
 from polycorner.motion.engine.paths import release_time
 from polycorner.motion.engine.rows import sticks
 
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
 REST, MOTION, EXIT, FAILED = np.int64(3), np.int64(4), np.int64(5), np.int64(6)
+ACTED, CEASED = np.int64(8), np.int64(9)
 
 
 @compiled
@@ -37,8 +40,7 @@ def store_impulses(model, state, pair, block, begin, end, h):
     not at all.
     """
     share = h / model.step
-    # The impulse of an impact says nothing about the forces that follow.
-    if share <= INSTANT:
+    if share <= BRIEF:
         return
     for b in range(begin, end):
         kind, i, f = block.origin[b, 0], block.origin[b, 1], block.origin[b, 2]
@@ -48,6 +50,8 @@ def store_impulses(model, state, pair, block, begin, end, h):
             pair.impulse[i, 0] = block.impulse[b, 0]
         elif kind == TIE_GAP:
             state.tie_normal[f] = block.impulse[b, 0] / share
+        elif kind == OWN_LIMIT:
+            state.limit_force[f] = block.impulse[b, 0] / (share * block.load[b])
         for r in range(block.rows[b]):
             if kind == OWN_FRICTION:
                 state.friction[f, r] = block.impulse[b, r] / share
@@ -103,6 +107,9 @@ def observe_block(model, state, work, b, h, time, sums):
         state.sticks[g] = 1 if sticks(model, body, block, b) else 0
     elif kind == TIE_FRICTION:
         state.tie_sticks[g] = 1 if sticks(model, body, block, b) else 0
+    if kind == OWN_LIMIT:
+        observe_limit(model, state, work, b, h, time)
+        return
     # Friction and equations neither open nor close.
     if block.rows[b] > 0 or block.bilateral[b]:
         return
@@ -135,11 +142,11 @@ def observe_block(model, state, work, b, h, time, sums):
     if kind == OWN_GAP:
         state.touches[g] = 1 if out[0] > 0.0 else 0
         state.release[g] = release
-        if share > INSTANT:
+        if share > BRIEF:
             state.pressed[g] = block.impulse[b, 0] / share
     elif kind == TIE_GAP:
         state.tie_touches[g], state.tie_release[g] = 1 if out[0] > 0.0 else 0, release
-        if share > INSTANT:
+        if share > BRIEF:
             state.tie_pressed[g] = block.impulse[b, 0] / share
     else:
         block.origin[b, 3] = 1 if out[0] > 0.0 else 0
@@ -147,16 +154,42 @@ def observe_block(model, state, work, b, h, time, sums):
 
 
 @compiled
+def observe_limit(model, state, work, b, h, time):
+    """Note whether a limit on velocities acts, and whether it began or ceased to, and when."""
+    block, event, old = work.block, work.event, work.velocity.old
+    i, g, p = block.bodies[b, 0], block.origin[b, 2], block.impulse[b, 0]
+    if block.bilateral[b]:
+        return
+    acts, was, share = p > 0.0, state.limit_acts[g] != 0, h / model.step
+    force = p / (share * block.load[b])
+    release = release_time(state.limit_before[g], force, state.limit_release[g], h, time)
+    if was and not acts:
+        event.happened[b], event.time[b] = CEASED, min(release, time + h)
+    if acts and not was:
+        start = work.limit.time[0] - 0.5 * h
+        evaluate_limits(model, work.scratch, i, state.q, old, 0.0, old, old, 0.0, start)
+        first = limit_value(model, work.scratch, i, g) / block.load[b]
+        passed = first - (block.free[b, 0] + block.offset[b, 0])  # by forces alone
+        part = min(1.0, max(0.0, first / passed)) if passed > 0.0 else 0.0
+        event.happened[b], event.time[b] = ACTED, time + part * h
+    state.limit_acts[g], state.limit_release[g] = 1 if acts else 0, release
+    if share > BRIEF:
+        state.limit_before[g] = force
+
+
+@compiled
 def place_of(model, pair, block, b):
     """Return the bodies, the second may be -1, and the number of the gap of a block, for events.
 
-    The limits and equations of ties have the numbers of their names.
+    Limits and equations of ties, and limits on velocities, have the numbers of their names.
     """
     kind, s, g = block.origin[b, 0], block.origin[b, 1], block.origin[b, 2]
     if kind == OWN_GAP:
         return s, NONE, g
     if kind == TIE_GAP:
         return model.tie_bodies[s, 0], model.tie_bodies[s, 1], model.tie_names[g]
+    if kind == OWN_LIMIT:
+        return s, NONE, model.limit_names[g]
     return pair.contact[s, 0], pair.contact[s, 1], g
 
 
@@ -234,7 +267,7 @@ def add_contacts(model, state, body, pair, block, event, begin, end, kept, share
         b, size = pair.sort_keys[s], kept + s
         state.keys[size] = key_of(model, state, pair, block.origin[b, 1])
         state.pair_release[size] = event.release[b]
-        lasting = 1.0 / share if share > INSTANT else 0.0
+        lasting = 1.0 / share if share > BRIEF else 0.0
         state.pair_impulse[size, 0] = block.impulse[b, 0] * lasting
         state.pair_flags[size, 0] = 0
         for a in range(k if model.may_rest else ZERO):

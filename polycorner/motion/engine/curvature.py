@@ -3,7 +3,14 @@
 import numpy as np
 
 from polycorner.formulas.compilation import never_inline
-from polycorner.motion.engine.arrays import BENT, CHANGED, OWN_GAP, SETTLED, TIE_GAP
+from polycorner.motion.engine.arrays import (
+    BENT,
+    CHANGED,
+    OWN_GAP,
+    OWN_LIMIT,
+    SETTLED,
+    TIE_GAP,
+)
 from polycorner.motion.engine.blocks import STRAIGHT
 from polycorner.motion.engine.bounds import equation_offset
 from polycorner.motion.engine.crowds import is_crowd
@@ -60,6 +67,8 @@ def correct_island(model, work, root, h):
         # With forces that follow the velocity, a bent bound is followed by
         # :func:`follow_curvature`: two corrections would chase each other.
         if block.rows[b] > 0 or (model.follows_velocity and block.bound[b] == BENT):
+            continue
+        if block.origin[b, 0] == OWN_LIMIT:
             continue
         i, g = block.bodies[b, 0], block.origin[b, 2]
         if block.origin[b, 0] == OWN_GAP:
@@ -163,6 +172,8 @@ def follow_curvature(model, state, work, blocks, h):
     first, second = NONE, NONE
     for b in range(blocks):
         if block.rows[b] > 0 or not (block.bilateral[b] or block.bound[b] == BENT):
+            continue
+        if block.origin[b, 0] == OWN_LIMIT:
             continue
         root = island_of(body, island, block, b)
         if island.stage[root] == SETTLED:

@@ -112,6 +112,10 @@ class Engine:
         self.motion.rank[:] = self.motion.body_of_rank[:] = np.arange(bodies.total)
         for first, end in zip(self.model.first_equation, self.model.first_gap[1:], strict=True):
             self.motion.touches[first:end] = 1
+        for first, end in zip(
+            self.model.first_nonholonomic, self.model.first_limit[1:], strict=True
+        ):
+            self.motion.limit_acts[first:end] = 1
         self._start_ties()
         self._allocate()
 
@@ -242,6 +246,11 @@ class Engine:
             for name, gap in zip(body.contacts, gaps, strict=True):
                 if np.isnan(gap):
                     return f"the gap {name!r}{where} is not a number"
+            if body.limits is not None:
+                (values,) = body.limits.rows.evaluate(np.concatenate([q, v, [self.time]]))
+                for name, value in zip(body.limits.names, values, strict=True):
+                    if np.isnan(value):
+                        return f"the limit {name!r}{where} is not a number"
         for row in np.flatnonzero(np.isnan(self.work.tie.gap)):
             return f"{bodies.ties.names[row]!r} is not a number at t = {self.time:.6g}"
         for t in np.flatnonzero(~np.isfinite(self.work.tie.force).all(axis=1)):
@@ -275,7 +284,7 @@ class Engine:
         """Continue, bit for bit, from arrays saved before, with at least as much room."""
         order = np.arange(self.bodies.total)  # that of states saved before bodies had ranks
         untied: dict[str, Any] = {
-            name: [] for name in EngineState._fields if name.startswith("tie_")
+            name: [] for name in EngineState._fields if name.startswith(("tie_", "limit_"))
         }
         arrays = {"rank": order, "body_of_rank": order, **untied, **arrays}
         while self.capacity < len(arrays["keys"]):
@@ -329,7 +338,8 @@ class Engine:
         which = self._between(first, second, gaps).tolist()
         bodies = zip(first.tolist(), second.tolist(), strict=True)
         between = zip(bodies, which, forces, strict=True)
-        return [*own, *((two, names[c], force) for two, c, force in between), *self._tied()]
+        pairs_too = ((two, names[c], force) for two, c, force in between)
+        return [*own, *pairs_too, *self._tied(), *self._limited()]
 
     def _tied(self) -> Iterator[tuple[tuple[int, ...], str, float]]:
         """Yield limits that touch, and equations, of ties."""
@@ -338,6 +348,15 @@ class Engine:
             i, j = ties.bodies[int(np.searchsorted(starts, row, side="right")) - 1]
             force = float(motion.tie_normal[row]) / self.dt
             yield ((i,) if j < 0 else (i, j)), ties.names[row], force
+
+    def _limited(self) -> Iterator[tuple[tuple[int, ...], str, float]]:
+        """Yield limits on velocities that act, and nonholonomic equations."""
+        motion, first = self.motion, self.model.first_limit
+        names = [self.bodies.kinds[a].body.limit_names for a in self.bodies.kind_of]
+        for g in np.flatnonzero(motion.limit_acts).tolist():
+            i = int(np.searchsorted(first, g, side="right")) - 1
+            if motion.alive[i]:
+                yield (i,), names[i][g - int(first[i])], float(motion.limit_force[g]) / self.dt
 
     def pair_of(self, s: int) -> tuple[tuple[int, int], int]:
         """Return the two bodies of a contact in the list, the lower number first, and the gap."""

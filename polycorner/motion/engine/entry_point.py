@@ -62,6 +62,7 @@ def readers(dimension: int) -> list[Any]:
     neighbours = read(parts["neighbours"])
     pair = read(parts["pair"])
     tie = read(parts["tie"])
+    limit = read(parts["limit"])
     block = read(parts["block"])
     event = read(parts["event"])
     search = read(parts["search"])
@@ -86,6 +87,7 @@ def readers(dimension: int) -> list[Any]:
             neighbours(at.neighbours),
             pair(at.pair),
             tie(at.tie),
+            limit(at.limit),
             block(at.block),
             event(at.event),
             search(at.search),

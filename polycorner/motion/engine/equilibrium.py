@@ -5,7 +5,7 @@ First it is asked which contacts can carry at the velocities of rest, and where 
 
 import numpy as np
 
-from polycorner.motion.engine.arrays import NEWTON_STEPS
+from polycorner.motion.engine.arrays import NEWTON_STEPS, OWN_LIMIT
 from polycorner.motion.engine.families import kind_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses
 from polycorner.motion.engine.island_matrix import (
@@ -53,7 +53,7 @@ def contacts_remain(model, velocity, block, search, scratch, first, last, goal):
         velocity_of(model, block, b, velocity.rest, u)
         if block.rows[b] == 0:
             near = REST_FACTOR * goal
-            if not block.bilateral[b]:
+            if not block.bilateral[b] and block.origin[b, 0] != OWN_LIMIT:
                 near = max(near, model.touching / model.step)
             if u[0] < -near or (block.bilateral[b] and u[0] > near):
                 return False

@@ -17,7 +17,7 @@ Impulses remain in their cones and gaps closed or opening, for both are convex.
 
 import numpy as np
 
-from polycorner.motion.engine.arrays import BENT, OWN_FRICTION, TIE_FRICTION
+from polycorner.motion.engine.arrays import BENT, OWN_FRICTION, OWN_LIMIT, TIE_FRICTION
 from polycorner.motion.engine.bounds import contact_of
 from polycorner.motion.engine.gauss_seidel import copy_impulses, recompute_velocities
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
@@ -39,7 +39,7 @@ PIECES = 4  # of an impact at most: slip that ends or not, in compression or exp
 @compiled
 def is_unilateral(block, b):
     """Return whether a block is that of a contact."""
-    return block.rows[b] == 0 and not block.bilateral[b]
+    return block.rows[b] == 0 and not block.bilateral[b] and block.origin[b, 0] != OWN_LIMIT
 
 
 @compiled

@@ -10,6 +10,7 @@ from polycorner.motion.engine.arrays import (
     NEWTON,
     NEWTON_STEPS,
     OWN_FRICTION,
+    OWN_LIMIT,
     PLASTIC,
     POISSON,
     SMALL,
@@ -37,9 +38,10 @@ from polycorner.motion.engine.impacts import (
 )
 from polycorner.motion.engine.island_matrix import number_bodies
 from polycorner.motion.engine.jit import NONE, ONE, compiled
+from polycorner.motion.engine.limits import ROUNDING
 from polycorner.motion.engine.linear_algebra import add_square, solve_spd
 from polycorner.motion.engine.newton import newton_steps
-from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts
+from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts, keeps_limits
 from polycorner.motion.engine.rows import copy_velocity, load_on, sticks, velocity_of
 from polycorner.motion.engine.signals import increase
 
@@ -76,6 +78,10 @@ def iterate(model, state, work, first, last, speed, again, may_rest):
     small = 0 < n * model.lanes <= FEW_LANES
     direct = n > 0 and (again or (small and last - first > FEW))
     enough = SPARE * goal if small else goal
+    aim = goal  # of Newton steps, which go on to a share of it
+    if model.limits > 0 and has_limit(block, first, last):
+        enough = min(enough, ROUNDING * speed)
+        aim = min(goal, enough / SPARE)
     worst = residual(model, velocity, block, search, scratch, first, last, 0.0)
     # The impulses of the step before may do: most islands of a heap at rest end here.
     if worst <= enough:
@@ -99,7 +105,7 @@ def iterate(model, state, work, first, last, speed, again, may_rest):
             # Softer contacts have larger regions in which Newton steps converge; hard ones every
             # third round, since only these solve the island.
             softness = hard if phase == 0 or rounds == 1 else MAX_SOFTNESS * 3.0**phase
-            steps, worst = newton_steps(model, work, first, last, n, goal, softness, 0.0, worst)
+            steps, worst = newton_steps(model, work, first, last, n, aim, softness, 0.0, worst)
             increase(state.counts, NEWTON_STEPS, steps)
             if worst > goal and rounds == 1:
                 if may_rest and rests(model, state, work, first, last, speed):
@@ -117,6 +123,15 @@ def iterate(model, state, work, first, last, speed, again, may_rest):
         rounds += 1
     increase(state.counts, SWEEPS, done)
     return worst
+
+
+@compiled
+def has_limit(block, first, last):
+    """Return whether a limit on velocities is in an island: velocities keep it up to rounding."""
+    found = False
+    for s in range(first, last):
+        found = found or block.origin[block.order[s], 0] == OWN_LIMIT
+    return found
 
 
 @compiled
@@ -349,9 +364,10 @@ def rests(model, state, work, first, last, speed):
                 v[i, c] = state.v[i, c]
             if not work.body.awake[i]:
                 continue
-            if state.rests[i] and keeps_contacts(model, mid, state.normal, i, state.v[i]):
+            still = state.rests[i] and keeps_limits(model, work.limit, i, state.v[i])
+            if still and keeps_contacts(model, mid, state.normal, i, state.v[i]):
                 continue
-            if not find_rest_velocity(model, mid, scratch, state.normal, i, rest):
+            if not find_rest_velocity(model, mid, work.limit, scratch, state.normal, i, rest):
                 return False
             for c in range(k):
                 far = abs(velocity.new[i, c] - rest[c]) * model.units[kind_of(model, i), c]

@@ -10,7 +10,7 @@ from polycorner.formulas.families import Family
 from polycorner.motion.bodies import IMPACT_LAWS, IdenticalBodies, MovingBodies, MovingBody
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.engine.allocation import filled
-from polycorner.motion.engine.arrays import PLASTIC, Model
+from polycorner.motion.engine.arrays import DISSIPATED, PLASTIC, Model
 from polycorner.motion.engine.sizes import EVENTS, Sizes
 from polycorner.motion.engine.threads import address_of_yield
 from polycorner.motion.formulation import moment
@@ -51,6 +51,12 @@ def model_of(
             f"rotation; got {solver.crowd_sweeps}"
         )
         raise NotImplementedError(msg)
+    if solver.crowd_sweeps and bodies.limit_names:
+        msg = (
+            "solver: expected crowd_sweeps=0 for bodies with limits on velocities, which few "
+            f"sweeps would not keep; got {solver.crowd_sweeps}"
+        )
+        raise NotImplementedError(msg)
     units, kicks = np.ones((sizes.A, sizes.k)), np.zeros((sizes.A, sizes.k))
     lever = np.zeros((sizes.A, sizes.k))
     for a, kind in enumerate(bodies.kinds):
@@ -75,7 +81,8 @@ def model_of(
         "exit_limit": [kind.exit_limit for kind in bodies.kinds],
         "constant_mass": [known["constant_mass"] for known in dependence],
         "follows_velocity": any(known["follows_velocity"] for known in dependence)
-        or any(form.damped for form in bodies.ties.forms),
+        or any(form.damped for form in bodies.ties.forms)
+        or bool(bodies.limit_names),
         "units": units,
         "lever": lever,
         "kicks": kicks,
@@ -97,7 +104,10 @@ def model_of(
         "give_way": address_of_yield(),
         # What is driven never rests for good, and a velocity of rest would be one of an instant.
         "may_rest": (any(_may_rest(kind) for kind in bodies.kinds) or bool(bodies.ties.bodies))
-        and not any(kind.body.timed for kind in bodies.kinds),
+        and not any(
+            kind.body.timed or (kind.body.limits and kind.body.limits.timed)
+            for kind in bodies.kinds
+        ),
         "follows_time": any(
             law.time_parameter >= 0 and not kind.body.slow_signals
             for kind, law in zip(bodies.kinds, laws, strict=True)
@@ -111,6 +121,7 @@ def model_of(
         **_kernels(bodies, parameters, sizes.k),
         **_pairs(bodies, parameters, sets),
         **_ties(bodies, parameters, sets),
+        **_limits(bodies),
         **_components(bodies, noise),
         **sets.values(),
     }
@@ -119,7 +130,7 @@ def model_of(
 
 def _may_rest(kind: IdenticalBodies) -> bool:
     """Return whether surroundings alone can hold a body of a kind."""
-    rows = sum(contact.rows for contact in kind.body.friction)
+    rows = sum(contact.rows for contact in kind.body.friction) + len(kind.body.limit_names)
     return len(kind.body.contacts) + rows >= kind.dimension
 
 
@@ -303,8 +314,32 @@ def _pairs(bodies: MovingBodies, parameters: list[float], sets: "_Sets") -> dict
     }
 
 
+def _limits(bodies: MovingBodies) -> dict[str, Any]:
+    """Return the entries of the limits on velocities."""
+    first, equations = [0], list[int]()
+    names = [n for kind in bodies.kinds for _ in range(kind.count) for n in kind.body.limit_names]
+    for kind in bodies.kinds:
+        held = 0 if kind.body.limits is None else kind.body.limits.equations
+        for _ in range(kind.count):
+            first.append(first[-1] + len(kind.body.limit_names))
+            equations.append(first[-1] - held)
+    own = [kind.body.limits for kind in bodies.kinds]
+    kernels = [one.rows.kernel.compiled(1).point if one else 0 for one in own]
+    bends = [one.rows.kernel.compiled(2).point if one and one.curved else 0 for one in own]
+    begin, account = tied_events(bodies), DISSIPATED + len(bodies.causes)
+    return {
+        "limits": len(names),
+        "limit_kernel": kernels,
+        "limit_bends": bends,
+        "first_limit": first,
+        "first_nonholonomic": equations,
+        "limit_names": [begin + bodies.contact_names.index(name) for name in names],
+        "limit_accounts": [account + bodies.limit_names.index(name) for name in names],
+    }
+
+
 def tied_events(bodies: MovingBodies) -> int:
-    """Return the number from which on numbers of gaps in events are names, of rows of ties."""
+    """Return the number from which on those of gaps in events are names, of ties and limits."""
     own = [kind.count * len(kind.body.contacts) for kind in bodies.kinds]
     return max(sum(own), *(len(one.gaps.names) for one in bodies.families.values()), 0)
 
@@ -361,6 +396,7 @@ def _components(bodies: MovingBodies, noise: Noise) -> dict[str, Any]:
         kind.body.formulation.time_parameter < 0
         and not any(noise.kicks.get(name, 0.0) for name in kind.body.formulation.coordinates)
         and not (noise.chatter and kind.body.formulation.loads)
+        and not (kind.body.limits and kind.body.limits.timed)
         for kind in bodies.kinds
     ]
     return {

@@ -11,12 +11,13 @@ there is always an impact, and the parts of a step, each solved for the whole he
 than shorter steps for all.  Crowds, whose steps need not be solved, are not left out.
 """
 
-from polycorner.motion.engine.arrays import CONTACTS, LIMITS
+from polycorner.motion.engine.arrays import CONTACTS, LIMITS, OWN_LIMIT
 from polycorner.motion.engine.bounds import contact_of, is_slow
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, compiled
+from polycorner.motion.engine.limit_blocks import mark_jumps
 from polycorner.motion.engine.neighbours import bodies_of, speed_of, travel
 from polycorner.motion.engine.partition import island_of, root_of
 from polycorner.motion.engine.paths import (
@@ -69,13 +70,17 @@ def leave_out(model, state, work, blocks, h):
         manner.near[0] = slow_travel(model, matrix.members[i])
         for s in range(island.start[i], island.start[i + 1]):
             b = block.order[s]
-            if block.rows[b] == 0 and strikes_early(
-                model, state, manner, mid, pair, work.tie, block, b
+            if (
+                block.rows[b] == 0
+                and block.origin[b, 0] != OWN_LIMIT
+                and strikes_early(model, state, manner, mid, pair, work.tie, block, b)
             ):
                 left[i] |= 1
     mark_misses(model, state, work, left, h)
     if model.ties > 0:
         mark_tie_misses(model, state, work, left, h)
+    if model.limits > 0:
+        mark_jumps(model, state, work, left, h)
     for i in range(N):
         # A neighbour has marked it; only what is not solved leaves a large island out.
         if is_large(island, i) and left[i] == 1:

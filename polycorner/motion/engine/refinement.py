@@ -29,6 +29,7 @@ from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.left_out import leave_out, slow_travel
+from polycorner.motion.engine.limit_blocks import acceptable_to_limits
 from polycorner.motion.engine.paths import acceptable_length, acceptable_to_ties
 from polycorner.motion.engine.sleep import stays_asleep, wake
 from polycorner.motion.engine.solution import evaluate_bodies
@@ -137,6 +138,8 @@ def refine(model, state, work, log, root, index, count):
             length = acceptable_length(model, state, work, h, work.scratch.image)
             if model.ties > 0:
                 length = min(length, acceptable_to_ties(model, state, work, h, work.scratch.image))
+            if model.limits > 0:
+                length = min(length, acceptable_to_limits(model, state, work, h))
             length = max(length, INSTANT * H)
             if length >= h:
                 break

@@ -47,7 +47,7 @@ def compliance(model, mid, lam, i, g):
 
 
 @compiled
-def find_rest_velocity(model, mid, scratch, lam, i, out):
+def find_rest_velocity(model, mid, limit, scratch, lam, i, out):
     """Find the velocity at which no loaded contact slips or opens; return whether there is one."""
     k, A = coordinates_of(model, i), scratch.matrix
     for c in range(k):
@@ -66,6 +66,9 @@ def find_rest_velocity(model, mid, scratch, lam, i, out):
                 add_square(A, mid.slip_rows[r], 1.0, k)
                 for c in range(k):
                     out[c] -= mid.slip_offset[r] * mid.slip_rows[r, c]
+    for g in range(model.first_limit[i], model.first_limit[i + 1]):
+        if limit.holds[g]:
+            add_square(A, limit.row[g], 1.0, k)
     if not solve_spd(A, out, k):
         return False
     top, units = 0.0, model.units[kind_of(model, i)]
@@ -77,7 +80,7 @@ def find_rest_velocity(model, mid, scratch, lam, i, out):
             out[c] = 0.0
     for c in range(k, model.dimension):
         out[c] = 0.0
-    return keeps_contacts(model, mid, lam, i, out)
+    return keeps_contacts(model, mid, lam, i, out) and keeps_limits(model, limit, i, out)
 
 
 @compiled
@@ -103,6 +106,19 @@ def keeps_contacts(model, mid, lam, i, v):
                     size += abs(mid.slip_rows[r, c] * v[c])
                 if abs(value) > 1e-11 * size:
                     return False
+    return True
+
+
+@compiled
+def keeps_limits(model, limit, i, v):
+    """Return whether a velocity leaves none of the limits that a body may be at rest on."""
+    for g in range(model.first_limit[i], model.first_limit[i + 1]):
+        value, size = 0.0, 0.0
+        for c in range(model.dimension):
+            value += limit.row[g, c] * v[c]
+            size += abs(limit.row[g, c] * v[c])
+        if limit.holds[g] and abs(value) > 1e-11 * size:
+            return False
     return True
 
 
@@ -196,7 +212,7 @@ def comes_to_rest(model, state, work, i, rest):
     for f in range(model.first_friction[i], model.first_friction[i + 1]):
         if load_of(model, mid, state.normal, i, f) > 0.0 and not state.sticks[f]:
             return False
-    if not find_rest_velocity(model, mid, scratch, state.normal, i, rest):
+    if not find_rest_velocity(model, mid, work.limit, scratch, state.normal, i, rest):
         return False
     size, far, old = work.body.island_speed[i], 0.0, 0.0
     for c in range(k):
@@ -216,6 +232,7 @@ def comes_to_rest(model, state, work, i, rest):
         still
         and not work.manner.located[0]
         and not is_tied(model, i)  # see `tied_sleep`
+        and model.first_limit[i] == model.first_limit[i + 1]  # which are no part of the proof
         and remains_at_rest(model, state, mid, sleep, scratch, i, others)
     ):
         state.asleep[i] = 1

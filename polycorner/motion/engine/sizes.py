@@ -28,7 +28,7 @@ class Sizes(NamedTuple):
     H: int  # laws of friction of all families
     T: int  # rows of the slip velocities of a family, at most
     Y: int  # gaps of a body, of two, or of a tie, whichever are most
-    D: int  # causes of dissipation
+    D: int  # causes of dissipation, then limits on velocities by name
     C: int  # contacts between bodies for which there is room
     P: int  # pairs of neighbours for which there is room
     B: int  # blocks
@@ -43,6 +43,7 @@ class Sizes(NamedTuple):
     TU: int  # their limits and equations
     TX: int  # their friction contacts
     RC: int  # equations of a closed component, times its coordinates
+    LU: int  # limits on velocities of all bodies, and their nonholonomic equations
 
     @classmethod
     def of(cls, bodies: MovingBodies, contacts: int) -> "Sizes":
@@ -59,12 +60,15 @@ class Sizes(NamedTuple):
         calls = [c for a in kinds for c in (*a.body.gaps, *a.body.formulation.slip_calls)]
         shapes += [(len(call.family.names), len(call.reads)) for call in calls]
         kernels = [m * (1 + k) + k for m, k in shapes]
+        sides = [(len(a.body.limit_names), 2 * a.dimension + 1) for a in kinds]
+        kernels += [m * (1 + k + k * k) + k for m, k in sides]
         lanes = -(-(k + any(kind.body.timed for kind in kinds)) // WIDTH) * WIDTH
         pairs = min(N * (N - 1) // 2, 8 * contacts) if N > 1 else 0
         entries = N * min(N - 1, MOST_ENTRIES)
         laws = max((len(family.laws) for family in families), default=0)
         rows, slips = len(ties.names), len(ties.friction)
-        blocks = F + own + (1 + laws) * contacts + rows + slips
+        limits = sum(kind.count * len(kind.body.limit_names) for kind in kinds)
+        blocks = F + own + (1 + laws) * contacts + rows + slips + limits
         gaps = max((len(family.gaps.names) for family in families), default=0)
         most = max(len(kind.body.contacts) for kind in kinds)
         return cls(
@@ -82,11 +86,11 @@ class Sizes(NamedTuple):
             H=sum(len(family.laws) for family in families),
             T=max((sum(law.rows for law in family.laws) for family in families), default=0),
             Y=max(most, gaps, ties.most_rows),
-            D=len(bodies.causes),
+            D=len(bodies.causes) + len(bodies.limit_names),
             C=contacts,
             P=pairs,
             B=blocks,
-            E=EVENTS + 2 * contacts + 3 * N + own + rows,
+            E=EVENTS + 2 * contacts + 3 * N + own + rows + limits,
             S=max(contacts, pairs, 1),
             W=max(kernels) + 16,
             Q=entries,
@@ -97,4 +101,5 @@ class Sizes(NamedTuple):
             TU=rows,
             TX=slips,
             RC=ties.closed_room(k, max(kind.body.equations for kind in kinds)),
+            LU=limits,
         )

@@ -19,6 +19,7 @@ from polycorner.motion.engine.contact_list import (
 from polycorner.motion.engine.crowds import ABREAST, divide_blocks, is_crowd
 from polycorner.motion.engine.curvature import correct_curvature
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.limit_blocks import assemble_limits
 from polycorner.motion.engine.neighbours import detect_all, detection_distance, order_contacts
 from polycorner.motion.engine.partition import find_islands
 from polycorner.motion.engine.phases import items_of, share_out, share_range
@@ -83,7 +84,10 @@ def assemble_blocks(model, state, work, h, contacts, ascending):
     body, shared = work.body, work.shared
     limit = shared.times[codes.DISTANCE] = detection_distance(model, body, h)
     share_range(model, state, work, codes.PREDICT, model.bodies, h)
-    own = first = assemble_body_blocks(model, state, work, h, limit)
+    own = assemble_body_blocks(model, state, work, h, limit)
+    if model.limits > 0:
+        own = assemble_limits(model, state, work, h, own)
+    first = own
     if model.ties > 0:
         first = assemble_ties(model, state, work, h, limit, own)
     order_contacts(model, state, work.pair, contacts, ascending)

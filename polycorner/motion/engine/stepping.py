@@ -37,6 +37,7 @@ from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.families import kind_of
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
+from polycorner.motion.engine.limit_blocks import begin_limits, follow_limits
 from polycorner.motion.engine.neighbour_list import list_neighbours, outdated
 from polycorner.motion.engine.neighbours import bodies_of
 from polycorner.motion.engine.sleep import settle, wake_neighbours
@@ -137,7 +138,9 @@ def attempt(model, state, work, h, time, index, any_awake):
     island = work.island
     blocks = ZERO
     unsettle(model, island)
-    for _ in range(FORCE_ROUNDS):
+    if model.limits > 0:
+        begin_limits(model, work, time + 0.5 * h)
+    for trial in range(FORCE_ROUNDS):
         if not start_bodies(model, state, work, h):
             return NOT_FINITE, blocks
         if not any_awake:
@@ -149,7 +152,16 @@ def attempt(model, state, work, h, time, index, any_awake):
         if not model.follows_velocity or (work.manner.located[0] and unsolved(model, island)):
             break
         follow_curvature(model, state, work, blocks, h)
-        update_forces(model, state, work, h)
+        # Not after the last solution, so that blocks are those that were solved for.
+        if model.limits > 0 and trial < FORCE_ROUNDS - 1:
+            passed = follow_limits(model, state, work, blocks, h)
+            update_forces(model, state, work, h)
+            if passed:  # new blocks: all are assembled anew
+                unsettle(model, island)
+                blocks = ZERO
+                continue
+        else:
+            update_forces(model, state, work, h)
         if not next_round(model, island):
             break
     for i in range(model.bodies):
