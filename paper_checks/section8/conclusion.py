@@ -9,15 +9,19 @@ import numpy as np
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner import (
     AllOf,
-    AnyOf,
     Manifold,
     Polyhedron,
     SmoothFunction,
+    System,
+    Trajectory,
     certify,
+    simulate,
     skeleton,
     stratum_at,
+    velocities,
 )
 from polycorner.models import Pinball
+from polycorner.motion import SpeedZones, motions
 from polycorner.polyhedra import LocalType
 
 if TYPE_CHECKING:
@@ -137,41 +141,71 @@ def _reached(p: "Array") -> "Array":
 
 # ---------------------------------------------------------------------------- limits on velocities
 
-PHASES = Manifold.euclidean("x v")  # along a road, in m, and the speed, in m/s
+LINE = Manifold.euclidean("x")  # along a road, in m; speeds are in m/s
 TOWN, FAST, SLOW = (100.0, 200.0), 30.0, 14.0
+BRAKES = 5.0  # m/s^2, also of full throttle
+ROAD = SpeedZones(FAST, {"town": (*TOWN, SLOW)}, LINE)
+SEEDS = [[0.5, 0.25], [0.5, 10.0], [150.0, 10.0]]
 
 
-def speed_limits(x: Any, v: Any) -> Any:
-    """Return the polyhedron of a speed limit of ``FAST`` that is ``SLOW`` in a town."""
-    return AllOf(v, FAST - v, AnyOf(SLOW - v, TOWN[0] - x, x - TOWN[1]))
+def cusped() -> Polyhedron:
+    """Return states under a constraint whose derivative vanishes where its sides meet."""
+    phases = motions(LINE)
+    x, v = phases.symbols
+    return Polyhedron(phases, AllOf(x**3 - v**2, 1 - x))
 
 
-def cusped(x: Any, v: Any) -> Any:
-    """Return a constraint on velocities whose derivative vanishes where its sides meet."""
-    return AllOf(x**3 - v**2, 1 - x)
-
-
-def limits_carve_a_polyhedron(limits: Callable[[Any, Any], Any] = speed_limits) -> Finding:
-    """Trace the set that inequalities in positions and velocities define in phase space."""
-    D = Polyhedron(PHASES, limits(*PHASES.symbols))
-    atlas = skeleton(D, [[0.5, 0.25], [0.5, 10.0], [150.0, 10.0]], extent=1e4)
-    types = [corner.local_type for corner in atlas.corners]
-    quadrants, unions = types.count(CONVEX), types.count(CONCAVE)
-    singular = [p for f in D.functions for p in _singular(f) if D.contains(p, tolerance=1e-9)]
-    degenerate = types.count(LocalType.DEGENERATE) + len(singular)
+def limits_carve_a_polyhedron(allowed: Callable[[], Polyhedron] = lambda: ROAD.allowed) -> Finding:
+    """Trace the sets that limits define in phase space, and drive along their boundary."""
+    every = [allowed(), ROAD.viable(BRAKES)]
+    (quadrants, unions, degenerate), (convex, concave, others) = map(_corners, every)
+    path, jump = drive(BRAKES), drive(None)
+    states = np.concatenate([path.q[:, 0], path.v[:, 0]], axis=1)
+    inside = bool(np.all(every[1].contains(states, tolerance=1e-9)))
+    slowed, fallen = (-float(np.diff(run.v[:, 0, 0]).min()) for run in (path, jump))
+    hardest, holds = slowed / path.dt, inside and not degenerate and not others
     return Finding(
-        Verdict.REFUTED if degenerate else Verdict.HOLDS_UNDER,
+        Verdict.HOLDS_UNDER if holds else Verdict.REFUTED,
         f"A limit of {FAST:g} m/s that is {SLOW:g} m/s between {TOWN[0]:g} and {TOWN[1]:g} m cuts "
         f"out of the plane of $x$ and $v$ a set with {quadrants} locally convex and {unions} "
-        f"locally concave corners, and {degenerate} where the derivatives are dependent. To "
-        f"enter the town at {FAST:g} m/s no braking is enough: slowing to {SLOW:g} m/s at "
-        f"{BRAKES:g} m/s² takes {braking():.4g} m.",
-        {"convex": quadrants, "concave": unions, "degenerate": degenerate, "braking": braking()},
+        f"locally concave corners, and {degenerate} where the derivatives are dependent. At full "
+        f"throttle a drive meets the town at {SLOW + fallen:.4g} m/s, and loses {fallen:.4g} m/s "
+        f"at once. With brakes of {BRAKES:g} m/s² the states from which no jump is needed lie "
+        f"below $v^2 = {SLOW:g}^2 + 2 \\cdot {BRAKES:g}\\,({TOWN[0]:g} - x)$, which begins "
+        f"{braking():.4g} m before the town: a set with {convex} locally convex and {concave} "
+        f"locally concave corners. Under these limits the drive "
+        f"{'stays' if inside else 'does not stay'} inside at every recorded instant, and is "
+        f"slowed down by {hardest:.4g} m/s² at most.",
+        {
+            "convex": quadrants,
+            "concave": unions,
+            "degenerate": degenerate,
+            "braking": braking(),
+            "jump": fallen,
+            "viable_convex": convex,
+            "viable_concave": concave,
+            "inside": inside,
+            "deceleration": hardest,
+        },
         correction=(
             "The derivatives of the active functions have to be independent, as they are for "
-            r"limits $u(x) - v \ge 0$, where $\partial f/\partial v = -1$. Unlike a wall such a "
-            "constraint exerts no force: what keeps a motion inside has to be said in addition."
+            r"limits $u(x) - v \ge 0$, where $\partial f/\partial v = -1$. An ideal limit exerts a "
+            r"force along $\partial f/\partial v$, as a wall does along $\partial f/\partial q$, "
+            "and as at a wall velocities jump where a limit falls. What bounded forces can keep "
+            r"is a smaller polyhedron of phase space, bounded by braking parabolas."
         ),
+    )
+
+
+def _corners(D: Polyhedron) -> tuple[int, int, int]:
+    """Return how many corners of a set are locally convex, concave, and degenerate."""
+    atlas = skeleton(D, SEEDS, extent=1e4)
+    types = [corner.local_type for corner in atlas.corners]
+    singular = [p for f in D.functions for p in _singular(f) if D.contains(p, tolerance=1e-9)]
+    return (
+        types.count(CONVEX),
+        types.count(CONCAVE),
+        types.count(LocalType.DEGENERATE) + len(singular),
     )
 
 
@@ -179,18 +213,24 @@ def _singular(f: SmoothFunction) -> "list[Array]":
     """Return the real points where a function vanishes together with its derivative."""
     import sympy
 
-    symbols = PHASES.symbols
+    symbols = motions(LINE).symbols
     system = [f.expression, *(f.expression.diff(s) for s in symbols)]
     solutions = sympy.solve([g for g in system if g != 0], symbols, dict=True)
     return [np.array([float(point[s]) for s in symbols]) for point in solutions]
 
 
-BRAKES = 5.0
-
-
 def braking() -> float:
     """Return the braking distance from ``FAST`` to ``SLOW`` at constant deceleration."""
     return (FAST**2 - SLOW**2) / (2 * BRAKES)
+
+
+def drive(braking: float | None) -> Trajectory:
+    """Drive at full throttle under the limits, those of viable states if ``braking`` is given."""
+    (x,), (v,) = LINE.symbols, velocities(LINE)
+    road = Polyhedron(LINE, {"begin": x + 1})
+    throttle = {"x": 0 * x + BRAKES}
+    car = System(road, v**2 / 2, forces=throttle, limits=ROAD.limits(braking))
+    return simulate(car, car.state([0.0], [20.0]), 15.0, 1e-2, every=1)
 
 
 # -------------------------------------------------------------------------------------------- cusps
