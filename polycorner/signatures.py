@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+NAMES: dict[Any, str] = {}  # annotations that are shown by a name, which docstrings explain
+
 
 class Legible(str):
     """A text that is shown without quotation marks."""
@@ -68,6 +70,8 @@ def _annotation(given: Any) -> Any:
 
 def written(annotation: Any) -> str:
     """Return an annotation in short."""
+    if not isinstance(annotation, str) and annotation in NAMES:
+        return NAMES[annotation]
     if isinstance(annotation, ForwardRef):
         return annotation.__forward_arg__
     if isinstance(annotation, str):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from polycorner import checks
+from polycorner import checks, signatures
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.holds import Angle, Coordinate, Position, hamilton, slopes_of
 from polycorner.bodies.laws import Coefficient, static_and_dynamic
@@ -178,6 +178,7 @@ class Prescribed(Checked):
 
 
 Drive = Damper | Motor | Prescribed
+signatures.NAMES[Drive] = "Drive"
 
 
 @dataclass(eq=False)

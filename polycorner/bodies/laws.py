@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from polycorner import checks
+from polycorner import checks, signatures
 from polycorner.checks import refuse
 from polycorner.errors import nearest
 
@@ -28,6 +28,7 @@ Coefficient = float | Both
 # Names are words and pairs of them, of which a mapping may have both.
 Coefficients = Coefficient | Mapping[Any, Coefficient]
 Restitution = float | Mapping[Any, float]
+signatures.NAMES |= {Coefficients: "Coefficients", Restitution: "Restitution"}
 
 T = TypeVar("T")
 
