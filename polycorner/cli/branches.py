@@ -210,7 +210,6 @@ def report_branches(  # noqa: PLR0913 - what is told, and how
         if out is None:
             return []
         from polycorner.files import save_diagram
-
         from polycorner.pictures import draw_branches, save
 
         with writing(out), timed("drawing"):
