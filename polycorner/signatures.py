@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-NAMES: dict[Any, str] = {}  # annotations that are shown by a name, which docstrings explain
+# Annotations, also as they are written, that are shown by a name; docstrings say what it means.
+NAMES: dict[Any, str] = {"Mapping[str, sympy.Expr]": "Expressions"}
 
 
 class Legible(str):
@@ -31,7 +32,8 @@ class Shown:
             msg = "__signature__"
             raise AttributeError(msg)
         found = readable(signature(owner.__init__))
-        return found.replace(parameters=[*found.parameters.values()][1:], return_annotation=owner)
+        parameters = [*found.parameters.values()][1:]
+        return found.replace(parameters=parameters, return_annotation=Legible(owner.__name__))
 
 
 def shown(function: F) -> F:
@@ -70,7 +72,7 @@ def _annotation(given: Any) -> Any:
 
 def written(annotation: Any) -> str:
     """Return an annotation in short."""
-    if not isinstance(annotation, str) and annotation in NAMES:
+    if annotation in NAMES:
         return NAMES[annotation]
     if isinstance(annotation, ForwardRef):
         return annotation.__forward_arg__

@@ -4,7 +4,7 @@ An impact has two phases.  In the *compression* contacts are plastic: it ends wi
 ``v_C`` and the impulses ``p_C``.  What follows differs:
 
 - *Poisson's* law: in an *expansion* from ``v_C`` a contact gets back ``e p_C``, or more if it would
-  close otherwise, and friction is loaded by that ([GP]);
+  close otherwise, and friction is loaded by that ([GlockerPfeiffer]);
 - *Newton's* law: one phase, in which normal velocities are reversed, ``J v+ >= -e J v-``;
 - *Stronge's* law, of one contact in the plane: slip is followed through the impact as Routh did,
   and the expansion ends when the normal impulse has given back ``e^2`` of the work that it took in
