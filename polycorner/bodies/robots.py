@@ -112,6 +112,7 @@ class Robot(Checked):
     def __post_init__(self) -> None:
         for argument in ("links", "joints", "walls", "fixed", "bodies"):
             object.__setattr__(self, argument, dict(checks.mapping(argument, vars(self)[argument])))
+        super().__post_init__()
         checks.choice("base", self.base, ("fixed", "floating"))
         if not self.links:
             refuse("links", "at least one link", self.links)
@@ -135,8 +136,8 @@ class Robot(Checked):
                 refuse("ignored", "pairs of names", pair)
             checks.names("ignored", pair, names)
         object.__setattr__(self, "ignored", tuple(map(tuple, self.ignored)))
-        super().__post_init__()
 
+    @checked
     def among(
         self,
         *,

@@ -132,7 +132,8 @@ def skeleton(
         expected = f"a list of points, shape (k, {points.shape[-1]})"
         checks.refuse("starts", expected, points.shape)
     points = polyhedron.manifold.placed(points, "starts")
-    options = checks.instance("options", options or WalkOptions(), WalkOptions)
+    options = WalkOptions() if options is None else options
+    checks.instance("options", options, WalkOptions)
     quotient = Quotient(
         polyhedron, symmetry or Symmetry(), tolerances, float(extent), options=options
     )

@@ -158,6 +158,9 @@ def read_coordinates(
 def _content(path: "str | os.PathLike[str]") -> str:
     try:
         return Path(path).read_text(encoding="utf-8-sig")
+    except IsADirectoryError as error:
+        msg = f"table: expected a file; {path} is a folder"
+        raise ValueError(msg) from error
     except UnicodeDecodeError as error:
         msg = f"table: expected text in UTF-8; {path} has other bytes ({error.reason})"
         raise ValueError(msg) from error
