@@ -103,7 +103,8 @@ def test_members_of_a_bunch_are_counted():
         rubbing=(0.1, 0.1),
     )
     run = follow_bunch(drum, 0.2, start=3, noise=Noise(chatter=0.1, seed=3), dt=0.004)
-    at = {name: values.item() for name, values in found.sel(start=3, rubbing=0.1).items()}
+    one = found.sel(start=3, rubbing=0.1)
+    at = {name: values.item() for name, values in one.items() if values.ndim == 0}
     assert at["left"] == len(run.exits)
     assert 0 < at["left"] < 12
     assert at["left"] == at["left_right"] + at["left_left"] + at["left_single"]
@@ -114,6 +115,27 @@ def test_members_of_a_bunch_are_counted():
     assert at["max_penetration"] == run.trajectory.max_penetration
     assert at["missed"] == run.trajectory.missed
     assert len(np.unique(found["reach"])) == 4
+    count = int(at["left"])
+    assert one["exit_time"].values[:count].tolist() == [time for time, _ in run.exits]
+    assert np.isnan(one["exit_time"].values[count:]).all()
+    hands = {"right": 1, "left": -1, "single": 0}
+    assert one["exit_hand"].values[:count].tolist() == [hands[k] for k in run.exit_kinds]
+    assert one["exit_alone"].values[:count].tolist() == [x.alone for x in run.leavings]
+    late = [
+        run.times.tolist().index(max(t for t in run.times if t <= 0.01 * k + 1e-12))
+        for k in range(1, 21)
+    ]
+    assert one["present_at"].values.tolist() == [run.present[i].sum() for i in late]
+    assert one["heap_at"].values.tolist() == [run.heap(i) for i in late]
+    assert one["right_at"].values.tolist() == [run.census(i)["right"] for i in late]
+
+
+def test_dynamic_coefficients_are_given_by_ratios():
+    given = {"start": 0, "count": 12, "duration": 0.2, "tilt": -20.0, "sliding": 0.15}
+    usual, other = bunch(**given), bunch(**given, sliding_ratio=0.95)
+    assert usual["reach"] != other["reach"]
+    kept = bunch(**given, sliding_ratio=2 / 3, rolling_ratio=0.6, rubbing_ratio=1.0)
+    assert kept["reach"][0] == pytest.approx(usual["reach"][0], abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -127,6 +149,7 @@ def test_members_of_a_bunch_are_counted():
         ({"pairs": "RX"}, "pairs: expected"),
         ({"count": 0}, "count: expected"),
         ({"rubbing": -0.1}, "rubbing: expected"),
+        ({"sliding_ratio": 1.5}, "sliding_ratio: expected"),
         ({"top": 0.0}, "top: expected"),
         ({"dt": 0.1}, "dt: expected"),
         ({"duration": math.nan}, "duration: expected"),

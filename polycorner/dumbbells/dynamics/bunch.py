@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from polycorner.dumbbells.drum import DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import (
     LEFT_AS,
+    MEMORY,
     DumbbellLengths,
     Handed,
     dyads_among,
@@ -48,6 +49,35 @@ def scattered(drum: DumbbellDrum, rng: np.random.Generator, *, width: float = WI
     """
     height = 2 * drum.length + 2 * drum.ball_radius
     return scatter(drum, rng, width=width, height=height, tries=TRIES)
+
+
+@dataclass(frozen=True)
+class Leaving:
+    """A dumbbell that left at the top.
+
+    Attributes
+    ----------
+    time : float
+        In s.
+    body : int
+    kind : str
+        In a ``right`` or ``left`` dyad, or ``single``.
+    heading : float
+        In the last record before, of a direction, in rad.
+    alone : float
+        For how long no other dumbbell had touched it, except those with which it was in a dyad in
+        the last 100 s, in s.
+    above : float
+        How much higher it was than the mean of all when one touched it last, or at the beginning,
+        in mm.
+    """
+
+    time: float
+    body: int
+    kind: str
+    heading: float
+    alone: float
+    above: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +130,46 @@ class BunchRun(Value):
 
         By :func:`polycorner.dumbbells.dynamics.pairs.left_as`.
         """
-        return tuple(left_as(self.times, self.exits, self.dyads))
+        return tuple(left_as(self.times, self.exits, self._handed.__getitem__))
+
+    @cached_property
+    def _handed(self) -> list[list[Handed]]:
+        return [self.dyads(index) for index in range(len(self.times))]
+
+    @cached_property
+    def leavings(self) -> tuple[Leaving, ...]:
+        """What is known of each of the :attr:`exits`."""
+        return tuple(
+            self._leaving(time, body, kind)
+            for (time, body), kind in zip(self.exits, self.exit_kinds, strict=True)
+        )
+
+    def _leaving(self, time: float, body: int, kind: str) -> Leaving:
+        first, stop = (int(np.searchsorted(self.times, t)) for t in (time - MEMORY, time))
+        recent = (pair for index in range(first, stop) for pair in self._handed[index])
+        dyads = {frozenset(pair[:2]) for pair in recent}
+        touched = (
+            index
+            for index in reversed(range(stop))
+            if any(body in pair for pair in self._touching(index, index) - dyads)
+        )
+        last = next(touched, 0)
+        heights = self.q[last, self.present[last], 1]
+        return Leaving(
+            time,
+            body,
+            kind,
+            math.remainder(float(self.q[stop - 1, body, 2]), math.pi),
+            time - float(self.times[last]),
+            float(self.q[last, body, 1] - heights.mean()),
+        )
+
+    def heap(self, index: int) -> int:
+        """Return how many dumbbells the largest group has that touch each other."""
+        import networkx as nx
+
+        graph = nx.Graph(map(tuple, self._touching(index, index)))
+        return max(map(len, nx.connected_components(graph)), default=1)
 
     def exit_counts(self) -> dict[str, int]:
         """Return how many left, by kind."""

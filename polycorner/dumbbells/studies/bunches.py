@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner.dumbbells.dynamics.pairs import LEFT_AS
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed, kicks_of
 from polycorner.toolkit import LONGEST, Array, checked, choice, real, whole
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 HEADING = 8.0  # degrees
 BETWEEN = 36.0  # mm, from pair to pair
+EXITS = 60  # how many that leave are told one by one
+INSTANTS = 20  # at which it is told who is in the drum
+HANDED = {kind: hand for hand, kind in LEFT_AS.items()}
 
 
 @checked
@@ -31,6 +35,9 @@ def bunch(
     sliding: float = 0.3,
     rolling: float = 0.1,
     rubbing: float = 0.3,
+    sliding_ratio: float | None = None,
+    rolling_ratio: float | None = None,
+    rubbing_ratio: float | None = None,
     tilt: float = 7.0,
     spin: float = 0.01,
     length: float = 16.0,
@@ -58,7 +65,9 @@ def bunch(
     top : float
         Height at which the drum ends, in mm.
     sliding, rolling, rubbing : float
-        Static coefficients; the dynamic ones change in proportion to the drum's defaults.
+        Static coefficients.
+    sliding_ratio, rolling_ratio, rubbing_ratio : float
+        Dynamic coefficients over static ones; by default those of the drum's defaults.
     tilt, spin : float
         Of the drum, in degrees and rad/s.
     length, ball_radius, rod_radius : float
@@ -83,6 +92,13 @@ def bunch(
         intervals of 10 s in which no third dumbbell touched them, and the mean rates of climbing,
         ``rate_right_free`` and ``rate_right_touched``, in mm/s.  ``max_penetration`` in mm;
         ``missed``, the share of groups in contact that were not solved to the tolerance.
+
+        Of the first sixty that leave, in the order in which they do, nan where fewer leave:
+        ``exit_time``, ``exit_hand`` (1 in a right-handed dyad, -1 in a left-handed one, 0 single),
+        ``exit_heading``, ``exit_alone`` and ``exit_above``; see
+        :class:`~polycorner.dumbbells.dynamics.bunch.Leaving`.  At the end of each twentieth of the
+        time: ``present_at``, dumbbells in the drum, ``heap_at``, those in the largest group that
+        touch each other, ``right_at`` and ``left_at``, those in dyads.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
     from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, follow_bunch, scattered
@@ -95,9 +111,9 @@ def bunch(
         rod_radius,
         tilt=math.radians(tilt),
         spin=spin,
-        sliding=in_proportion(sliding, DumbbellDrum.sliding),
-        rolling=in_proportion(rolling, DumbbellDrum.rolling),
-        rubbing=in_proportion(rubbing, DumbbellDrum.rubbing),
+        sliding=coefficients("sliding", sliding, sliding_ratio),
+        rolling=coefficients("rolling", rolling, rolling_ratio),
+        rubbing=coefficients("rubbing", rubbing, rubbing_ratio),
     )
     drum = drum_for_bunch(drum, count=2 * len(pairs) or count, top=top)
     drum, noise = disturbed(drum, kind, strength, scale, start)
@@ -117,6 +133,8 @@ def bunch(
         "reach": (float(run.q[-1, there, 1].mean()) if there.any() else math.nan, "mm"),
         "highest": (float(run.q[..., 1].max()), "mm"),
         **_climbing(run),
+        **_leavings(run),
+        **_history(run),
         "max_penetration": (run.trajectory.max_penetration, "mm"),
         "missed": run.trajectory.missed,
     }
@@ -135,6 +153,25 @@ def one_above_the_other(drum: "DumbbellDrum", pairs: str) -> Array:
     return np.concatenate(places)
 
 
+def _leavings(run: "BunchRun") -> dict[str, Any]:
+    """Return times, hands, headings and isolation of those that leave, ``(60,)`` each."""
+    columns = np.full((5, EXITS), math.nan)
+    for k, one in enumerate(run.leavings[:EXITS]):
+        heading = math.degrees(one.heading)
+        columns[:, k] = one.time, HANDED[one.kind], heading, one.alone, one.above
+    units = {"time": "s", "hand": "1", "heading": "deg", "alone": "s", "above": "mm"}
+    return {f"exit_{name}": (x, units[name]) for name, x in zip(units, columns, strict=True)}
+
+
+def _history(run: "BunchRun") -> dict[str, Any]:
+    """Return who is in the drum at twenty instants, ``(20,)`` each."""
+    times = run.times[-1] * np.arange(1, INSTANTS + 1) / INSTANTS
+    indices = (np.searchsorted(run.times, times, side="right") - 1).tolist()
+    rows = [run.census(index) | {"heap": run.heap(index)} for index in indices]
+    names = ("present", "heap", "right", "left")
+    return {f"{name}_at": np.array([float(row[name]) for row in rows]) for name in names}
+
+
 def _climbing(run: "BunchRun") -> dict[str, Any]:
     """Return the share of free dyads and the mean rates of climbing, by chirality."""
     found: dict[str, Any] = {}
@@ -149,6 +186,11 @@ def _climbing(run: "BunchRun") -> dict[str, Any]:
     return found
 
 
-def in_proportion(static: float, usual: tuple[float, float]) -> tuple[float, float]:
-    """Return a static coefficient, and a dynamic one in the ratio of the usual two."""
+def coefficients(name: str, static: float, ratio: float | None) -> tuple[float, float]:
+    """Return a static coefficient and a dynamic one, in a ratio or in that of the drum's own."""
+    from polycorner.dumbbells.drum import DumbbellDrum
+
+    if ratio is not None:
+        return static, static * real(f"{name}_ratio", ratio, least=0, most=1)
+    usual = getattr(DumbbellDrum, name)
     return static, static * usual[1] / usual[0]

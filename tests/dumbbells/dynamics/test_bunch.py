@@ -71,6 +71,41 @@ def exits_of(hand):
     return still(drum, q, times, present, [(1.5, 0), (2.5, 1), (2.7, 2)])
 
 
+def test_what_is_known_of_those_that_leave_is_read_off_the_records():
+    """Against a slow reading of all records of a run that is tilted the other way."""
+    drum = replace(SMALL, count=16, top=40.0, tilt=math.radians(-20.0), sliding=(0.15, 0.1))
+    run = follow_bunch(drum, 1.0, start=1, dt=2e-3, interval=0.02)
+    assert len(run.leavings) > 3
+    for one in run.leavings:
+        before = [i for i, t in enumerate(run.times) if t < one.time]
+        partners = {
+            body for i in before for *two, _ in run.dyads(i) if one.body in two for body in two
+        }
+        touched = [
+            i
+            for i in before
+            for bodies, *_ in run.trajectory.touching[i]
+            if one.body in bodies and set(bodies) - partners - {one.body}
+        ]
+        last = touched[-1] if touched else 0
+        assert one.alone == one.time - run.times[last]
+        there = [run.q[last, k, 1] for k in range(16) if run.present[last, k]]
+        assert one.above == pytest.approx(run.q[last, one.body, 1] - np.mean(there))
+        assert math.tan(one.heading) == pytest.approx(math.tan(run.q[before[-1], one.body, 2]))
+    assert {one.alone == one.time for one in run.leavings} == {True, False}
+
+
+def test_a_heap_is_the_largest_group_that_touches():
+    run = follow_bunch(replace(SMALL, count=16), 1.0, start=1, dt=2e-3, interval=0.1)
+    groups = [{k} for k in range(16)]
+    for bodies, *_ in run.trajectory.touching[-1]:
+        if len(bodies) == 2:
+            met = [group for group in groups if group & set(bodies)]
+            groups = [group for group in groups if group not in met] + [set().union(*met)]
+    assert run.heap(len(run.times) - 1) == max(map(len, groups)) > 1
+    assert run.heap(0) >= 1
+
+
 @pytest.mark.parametrize(("hand", "kind"), [("R", "right"), ("L", "left")])
 def test_both_members_of_a_dyad_leave_as_such(hand, kind):
     """The second one is alone in the last record, but was not a moment ago."""
