@@ -48,6 +48,7 @@ from examples import (
     ex36_nested_corner,
     ex37_sticky_clusters,
     ex38_pinball_pockets,
+    ex38_paper_heading,
 )
 from polycorner import Verdict, minimise, stratum_at
 from polycorner.dumbbells import DumbbellPair
@@ -76,6 +77,34 @@ def test_heading():
 def test_heading_figure(tmp_path):
     ex01_heading.draw(tmp_path / "heading.png")
     assert (tmp_path / "heading.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("length", "hand", "sign"), [(16.0, "R", 1), (16.0, "L", -1), (10.0, "R", 1)]
+)
+def test_the_papers_heading_follows_from_two_assumptions(length, hand, sign):
+    """Against the closed forms of the plane, with p across and D along; see docs/heading.md."""
+    row = ex38_paper_heading.row(length, hand)
+    p, shift = 4.5, length - math.sqrt(36 - 4.5**2)
+    expected = {
+        "neither": math.atan2(2 * shift * p, shift**2 + length**2 - p**2) / 2,
+        "across": math.atan2(2 * length * 6, 2 * length**2 - 36) / 2,
+        "outer": math.atan(p / (shift + length)),
+        "both": math.atan(3 / length),
+    }
+    assert {k: math.radians(x) for k, x in row.cases.items()} == pytest.approx(
+        {k: sign * x for k, x in expected.items()}, abs=1e-10
+    )
+    assert row.formula == pytest.approx(row.cases["both"], abs=1e-9)
+    assert row.single == pytest.approx(sign * math.degrees(math.asin(3 / length)))
+    assert row.drum == pytest.approx(row.cases["neither"], abs=2e-3)
+    assert [name for name, good in row.held.items() if good] == ["neither"]
+
+
+def test_the_papers_heading_is_drawn(tmp_path):
+    rows = [ex38_paper_heading.row(16.0, "R"), ex38_paper_heading.row(16.0, "L")]
+    ex38_paper_heading.draw(rows, tmp_path / "paper.png")
+    assert (tmp_path / "paper.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_own_polyhedron():
