@@ -163,21 +163,28 @@ def torque_grows_in(region: Callable[[Array, Array], Array] = beyond_the_curve) 
 
 
 def steep_headings_change(
-    direction: int = 1, headings: tuple[float, ...] = (60.0, 65.0, 70.0, 75.0, 80.0, 85.0)
+    direction: int = 1,
+    headings: tuple[float, ...] = (60.0, 65.0, 70.0, 75.0, 80.0, 85.0),
+    room: float = 300.0,
 ) -> Finding:
     """Simulate dumbbells of these headings from the lowest line, without noise, for 30 s.
 
-    Holds if the heading of most has grown (``direction = 1``) or decreased (-1) by a degree.
+    Each is followed until it is ``room`` mm lower in the drum.  Holds if the heading of most has
+    grown (``direction = 1``) or decreased (-1) by a degree.
     """
     path = follow(DRUM, np.radians(headings), 30.0, dt=2e-3)
-    start, end = (np.abs(np.degrees(path.q[i, :, 2])) for i in (0, -1))
-    largest = np.abs(np.degrees(path.q[:, :, 2])).max(axis=0)
+    angles, fallen_by = np.abs(np.degrees(path.q[:, :, 2])), path.q[0, :, 1] - path.q[:, :, 1]
+    out = fallen_by > room
+    last = np.where(out.any(axis=0), out.argmax(axis=0), len(path) - 1)
+    start, end = angles[0], angles[last, np.arange(len(headings))]
+    largest = np.array([angles[: n + 1, k].max() for k, n in enumerate(last)])
     grown, fallen = int((end > start + 1).sum()), int((end < start - 1).sum())
     listed = ", ".join(f"{a:g}° to {b:.1f}°" for a, b in zip(start, end, strict=True))
     return Finding(
         judged((grown if direction > 0 else fallen) > len(headings) / 2),
-        f"in 30 s {grown} of {len(headings)} headings grow and {fallen} decrease, from {listed}; "
-        f"the largest meanwhile is {largest.max():.1f}°",
+        f"in 30 s, or until they are {room:g} mm lower, {grown} of {len(headings)} headings grow "
+        f"and {fallen} decrease, from {listed}; the largest meanwhile is {largest.max():.1f}°; "
+        f"{out.any(axis=0).sum()} of them would need a longer drum than that to turn further",
         {"grown": float(grown), "fallen": float(fallen), "largest": float(largest.max())},
         "in the model a steep dumbbell turns towards the meridian as it descends",
     )

@@ -24,7 +24,7 @@ from polycorner.dumbbells.dynamics.bunch import (
     exit_statistics,
     follow_bunch,
 )
-from polycorner.dumbbells.dynamics.dyads import handedness
+from polycorner.dumbbells.dynamics.dyads import handedness, minimiser_heading
 from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed
@@ -181,19 +181,24 @@ def breaks_at_the_bottom(apart: bool = True, duration: float = 150.0) -> Finding
     )
 
 
-def can_leave_in_time(length: float = 300.0, heading: float = 15.0) -> Finding:
-    """Compare the length of a drum with the climb of a dyad in twenty minutes."""
-    speed = DRUM.spin * DRUM.centre_radius * math.tan(math.radians(heading))
-    reach = speed * OBSERVED_TIME
-    angles = (math.degrees(math.atan(3 / 16)), 7.94)
-    other = [DRUM.spin * DRUM.centre_radius * math.tan(math.radians(a)) for a in angles]
+def can_leave_in_time(length: float = TOP, observed: float = 15.0) -> Finding:
+    """Compare the length of a drum with the climb of a dyad in twenty minutes, without slip.
+
+    The heading is that of least energy, the paper's formula for it, or the one ``observed``.
+    """
+    least = minimiser_heading(replace(DRUM, count=2))
+    formula = math.degrees(math.atan(DRUM.ball_radius / DRUM.length))
+    full = OBSERVED_TIME * DRUM.spin * DRUM.centre_radius
+    reach = {a: full * math.tan(math.radians(a)) for a in (least, formula, observed)}
+    needed = math.degrees(math.atan(length / full))
+    listed = ", ".join(f"at {a:.1f}° {way:.0f} mm" for a, way in reach.items())
     return Finding(
-        Verdict.HOLDS_UNDER if length <= reach else Verdict.REFUTED,
-        f"at {heading:g}° a dyad climbs at most {speed:.3f} mm/s and {reach:.0f} mm in twenty "
-        f"minutes, at {angles[0]:.1f}° {other[0] * OBSERVED_TIME:.0f} mm and at {angles[1]:.1f}° "
-        f"{other[1] * OBSERVED_TIME:.0f} mm; the drum is assumed {length:g} mm long",
-        {"reach": reach, "length": length},
-        f"a drum shorter than {reach:.0f} mm; its length is not given",
+        Verdict.HOLDS_UNDER if length <= max(reach.values()) else Verdict.REFUTED,
+        f"in twenty minutes a dyad climbs at most {listed}: the heading of least energy, that of "
+        f"the paper's formula and the one observed; a drum of {length:g} mm needs {needed:.1f}°",
+        {"reach": reach[observed], "least_reach": reach[least], "needed": needed},
+        f"for the heading observed a drum shorter than {reach[observed]:.0f} mm, for that of least "
+        f"energy one shorter than {reach[least]:.0f} mm; the length of the drum is not given",
     )
 
 

@@ -1,5 +1,6 @@
 """Section 6: minima of the energy of a pair, and claims about its corner."""
 
+import math
 from dataclasses import replace
 from functools import cache, partial
 
@@ -32,6 +33,7 @@ from polycorner.proofs import StationaryList, stationary_points
 
 THIN = DumbbellPair(length=12.5, ball_radius=3, rod_radius=0.05, drum_radius=125)
 THICK = replace(EXPERIMENT, rod_radius=2.95)
+SHORT = replace(EXPERIMENT, length=7)  # a ball touches both balls of the other dumbbell
 NAMED = frozenset({"G", "delta_R", "delta_L"})
 OTHERS = tuple(
     replace(EXPERIMENT, length=length, rod_radius=rod)
@@ -103,7 +105,7 @@ def only_loci(
     pairs: tuple[DumbbellPair, ...] = (*OTHERS, BUNCH),
     starts: int = 1000,
 ) -> Finding:
-    """List all local minima with proof; then examine rods far thinner than the experiment's."""
+    """List all local minima with proof; then examine far thinner and shorter rods."""
     found = {pair: everything(pair) for pair in pairs}
     complete = all(listed.complete for listed, _ in found.values())
     boxes = sum(listed.tally.boxes for listed, _ in found.values())
@@ -131,6 +133,10 @@ def only_loci(
         return Finding(Verdict.HOLDS, told, numbers)
     rho, width = THIN.centre_radius, THIN.length**2 / 16
     level = float(rho - np.sqrt(rho**2 - 4 * width)) / 2
+    short, others = everything(SHORT)
+    balls = {name for name in others - {"G"} if not set("ab") & set(name)}
+    reach = 2 * math.sqrt(4 * SHORT.ball_radius**2 - (SHORT.ball_radius + SHORT.rod_radius) ** 2)
+    replaced = short.complete and others == {"G"} | balls and len(balls) > 0
     thicker = fallen(replace(THIN, rod_radius=1.2 * level), starts)
     crossings = sum("ab" in c.active for c in thicker)
     return Finding(
@@ -140,9 +146,23 @@ def only_loci(
         f"{THIN.length / THIN.drum_radius:g}$), a crossed pair held by "
         f"{', '.join(proofs[0].active)} is proved to be a strict local minimum up to shifts; with "
         f"rods of {1.2 * level:.3f} mm {crossings or 'no'} crossed ones are found by descent from "
-        f"{starts} random placements.",
-        numbers | {"other_minima_proved": float(len(proofs)), "level_crossing_below": level},
-        "$G \\cup \\delta$ is everything for dumbbells of the experiment's sizes (proved). With "
+        f"{starts} random placements. For $\\ell = {SHORT.length:g}$ mm the complete list has "
+        + (
+            "$G$ and pairs held by three contacts of balls, in place of $\\delta$."
+            if replaced
+            else f"{', '.join(sorted(others))}."
+        ),
+        numbers
+        | {
+            "other_minima_proved": float(len(proofs)),
+            "level_crossing_below": level,
+            "by_balls": float(len(balls)),
+            "shortest": reach,
+        },
+        "$G \\cup \\delta$ is everything for dumbbells of the experiment's sizes (proved). Rods "
+        "have to be long, as section 5 assumes and section 6 does not repeat: where $\\ell < "
+        f"2\\sqrt{{4r^2 - (r+t)^2}}$, here {reach:.2f} mm, a ball touches both balls of the other "
+        "dumbbell before its rod, and three contacts of balls hold the pair. With "
         "very thin rods there are minima with one dumbbell across the other. A level crossing "
         f"needs $t(R - r - t) \\le \\ell^2/16$, here $t \\le {level:.3f}$ mm, and for thicker rods "
         "none is found; $D$ then has rod-rod contacts.",

@@ -79,8 +79,14 @@ def test_bunches_are_judged_by_how_many_have_left(monkeypatch):
 
 
 def test_the_reach_of_a_dyad_is_speed_times_time():
-    found = bunch.can_leave_in_time().numbers["reach"]
-    assert found == pytest.approx(0.01 * 122 * math.tan(math.radians(15)) * 1200)
+    found = bunch.can_leave_in_time().numbers
+    assert found["reach"] == pytest.approx(0.01 * 122 * math.tan(math.radians(15)) * 1200)
+    assert found["least_reach"] == pytest.approx(
+        0.01 * 122 * math.tan(math.radians(7.943)) * 1200, rel=1e-4
+    )
+    assert 0.01 * 122 * math.tan(math.radians(found["needed"])) * 1200 == pytest.approx(300)
+    assert bunch.can_leave_in_time(found["least_reach"]).verdict is Verdict.HOLDS_UNDER
+    assert bunch.can_leave_in_time(found["reach"] + 1).verdict is Verdict.REFUTED
 
 
 def test_more_sliding_friction_lets_steeper_dumbbells_climb():
