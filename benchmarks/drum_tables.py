@@ -26,7 +26,7 @@ FEATURES = {  # of starts, at the first of twenty instants
     "in right-handed dyads": "right_at",
     "in left-handed dyads": "left_at",
 }
-DRIVEN = ("heading", "spread", "settled", "samples", "relaxation", "climb_rate", "corner")
+STEADY = 1.0  # degrees, the spread below which starts from both sides have met
 Row = dict[str, Any]
 
 
@@ -158,24 +158,33 @@ def ranks(values: Sequence[float]) -> np.ndarray:
 def driven(found: xr.Dataset) -> Iterator[Row]:
     """Yield rows of the study ``driven``: right- and left-handed pairs, and single dumbbells."""
     for axes, one in points(found):
-        row: Row = {words(name): short(value) for name, value in axes.items()}
-        for hand, letter in (("right", "R"), ("left", "L")):
-            value, error = (float(one[f"heading_{hand}{e}"]) for e in ("", "_error"))
-            row |= {
-                f"heading {letter}": with_error(value, error, 2, "°"),
-                f"spread {letter}": f"{float(one[f'spread_{hand}']):.1f}°",
-                f"steady {letter}": "yes" if float(one[f"settled_{hand}"]) else "no",
-                f"climb {letter}": f"{float(one[f'climb_rate_{hand}']):.3f}",
-            }
-        yield row | {
-            "n": f"{float(one['samples_right']):.0f}",
-            "relaxation (s)": f"{float(one['relaxation_right']):.0f}".replace("inf", "∞"),
-            "corner": f"{100 * float(one['corner_right']):.0f} %",
-            "held R, L": f"{float(one['held_right']):.0f}, {float(one['held_left']):.0f}",
-            "rate (1/s)": f"{float(one['single_rate']):.4f}",
-            "kept": f"{float(one['single_kept']):.2f}",
-            "climb, single": f"{float(one['single_climb_rate']):.3f}",
+        value = {str(name): float(x) for name, x in one.data_vars.items() if x.dtype.kind in "fi"}
+        yield {
+            **{words(name): short(x) for name, x in axes.items()},
+            **headings(value, "right", "R"),
+            "n": number(value["samples_right"], 0),
+            "relaxation (s)": number(value["relaxation_right"], 0),
+            "climb R": number(value["climb_rate_right"], 3),
+            "corner": f"{number(100 * value['corner_right'], 0)} %",
+            **headings(value, "left", "L"),
+            "climb L": number(value["climb_rate_left"], 3),
+            "held R, L": f"{value['held_right']:.0f}, {value['held_left']:.0f}",
+            "rate (1/s)": number(value["single_rate"], 4),
+            "kept": number(value["single_kept"], 2),
+            "climb, single": number(value["single_climb_rate"], 3),
         }
+
+
+def headings(value: dict[str, float], hand: str, letter: str) -> Row:
+    """Return heading, its spread over the pairs, and whether it is steady."""
+    spread_of = value[f"spread_{hand}"]
+    return {
+        f"heading {letter}": with_error(
+            value[f"heading_{hand}"], value[f"heading_{hand}_error"], 2, "°"
+        ),
+        f"spread {letter}": "–" if math.isnan(spread_of) else f"{number(spread_of, 1)}°",
+        f"steady {letter}": "yes" if value[f"settled_{hand}"] and spread_of < STEADY else "no",
+    }
 
 
 # -------------------------------------------------------------------------------------------- words
@@ -198,9 +207,18 @@ def short(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
+def number(value: float, digits: int) -> str:
+    """Return a number with a minus sign, and a dash where there is none."""
+    if math.isnan(value):
+        return "–"
+    return f"{value:.{digits}f}".replace("-", "−").replace("inf", "∞")
+
+
 def with_error(value: float, error: float, digits: int, unit: str = "") -> str:
     """Return a value with its error, where there is one."""
-    told = f"{value:.{digits}f}"
+    if math.isnan(value):
+        return "–"
+    told = number(value, digits)
     return f"{told}{unit}" if math.isnan(error) else f"{told} ± {error:.{digits}f}{unit}"
 
 

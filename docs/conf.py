@@ -38,6 +38,7 @@ extensions = [
 exclude_patterns = [
     "_build",
     "paper_table.md",  # a part of paper.md
+    "tables",  # parts of drum_results.md
     "generated/gallery/*.zip",
     "generated/backreferences/*",
     "templates",

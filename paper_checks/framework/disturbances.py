@@ -1,7 +1,10 @@
 """Kinds of noise by which observations are judged, each with its strength and time."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
+
+from polycorner.dumbbells.drum import DumbbellDrum
 
 ALONG = "shaking along"
 
@@ -25,6 +28,29 @@ class Disturbance(NamedTuple):
         band = f"{0.05 / self.scale:.2g} to {0.5 / self.scale:.2g} Hz"
         way = self.kind.replace(ALONG, "shaking along the axis")
         return f"{way} with {self.strength:g} mm/s² at {band}"
+
+
+class Friction(NamedTuple):
+    """Static coefficients; the dynamic ones are in proportion to those of the drum's defaults."""
+
+    sliding: float
+    rolling: float
+    rubbing: float
+
+    def __str__(self) -> str:
+        """Return the coefficients in words."""
+        return f"sliding {self.sliding:g}, rolling {self.rolling:g}, rubbing {self.rubbing:g}"
+
+    def of(self, drum: DumbbellDrum) -> DumbbellDrum:
+        """Return the drum with these coefficients."""
+        usual = DumbbellDrum.sliding, DumbbellDrum.rolling, DumbbellDrum.rubbing
+        pairs = zip(self, usual, strict=True)
+        sliding, rolling, rubbing = ((mu, mu * pair[1] / pair[0]) for mu, pair in pairs)
+        return replace(drum, sliding=sliding, rolling=rolling, rubbing=rubbing)
+
+
+TEXT = Friction(0.3, 0.1, 0.3)  # the paper gives no rubbing
+CAPTIONS = Friction(0.72, 0.1, 0.1)  # sliding from the angle of 8 degrees of the caption (F2c)
 
 
 def which(some: Sequence[Disturbance], kinds: Sequence[Disturbance]) -> str:

@@ -1,7 +1,7 @@
 """Checks of section 3: dumbbells and bunches as observed."""
 
 from paper_checks.framework.claims import Claim
-from paper_checks.section3 import bunch, dyads, singles, steep, zigzag
+from paper_checks.section3 import bunch, dyads, singles, steep, together, zigzag
 
 CLAIMS: tuple[Claim, ...] = (
     *singles.CLAIMS,
@@ -9,4 +9,5 @@ CLAIMS: tuple[Claim, ...] = (
     *dyads.CLAIMS,
     *zigzag.CLAIMS,
     *bunch.CLAIMS,
+    *together.CLAIMS,
 )

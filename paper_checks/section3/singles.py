@@ -17,7 +17,7 @@ from paper_checks.appendixA.forces import STATIC, judged
 from paper_checks.appendixA.torque import DRUM
 from paper_checks.appendixA.turning import turns
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.framework.disturbances import ALONG, Disturbance, which
+from paper_checks.framework.disturbances import ALONG, TEXT, Disturbance, Friction, which
 from polycorner.dumbbells.dynamics.singles import follow, zigzags
 from polycorner.dumbbells.statics.keel import Keel
 from polycorner.dumbbells.studies.driven import disturbed
@@ -38,10 +38,13 @@ START = (15.0, 15.0, -15.0, -15.0, 0.0, 0.0)
 
 @cache
 def shaken(
-    noise: Disturbance, headings: tuple[float, ...] = START, duration: float = 200.0
+    noise: Disturbance,
+    headings: tuple[float, ...] = START,
+    duration: float = 200.0,
+    friction: Friction = TEXT,
 ) -> Trajectory:
     """Simulate dumbbells under noise, from the lowest line."""
-    drum, kicks = disturbed(DRUM, *noise, 1)
+    drum, kicks = disturbed(friction.of(DRUM), *noise, 1)
     dt = 1e-3 if noise.kind == "kicks" else 2e-3
     return follow(drum, np.radians(headings), duration, noise=kicks, dt=dt)
 

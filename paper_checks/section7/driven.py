@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from paper_checks.appendixA.torque import DRUM
-from paper_checks.framework.disturbances import ALONG, Disturbance
+from paper_checks.framework.disturbances import ALONG, TEXT, Disturbance, Friction
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, follow_pairs
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.studies.driven import disturbed
@@ -42,10 +42,14 @@ ALL: Starts = (*(("R", a) for a in ANGLES), *(("L", -a) for a in ANGLES))
 
 @cache
 def disturbed_dyads(
-    noise: Disturbance, duration: float, tilt: float = 7.0, length: float = 16.0
+    noise: Disturbance,
+    duration: float,
+    tilt: float = 7.0,
+    length: float = 16.0,
+    friction: Friction = TEXT,
 ) -> DyadPaths:
     """Simulate five right-handed and five left-handed nested pairs; angles in degrees."""
-    drum = replace(DRUM, tilt=math.radians(tilt), length=length)
+    drum = friction.of(replace(DRUM, tilt=math.radians(tilt), length=length))
     drum, kicks = disturbed(drum, *noise, 1)
     starts = [(hand, math.radians(degrees)) for hand, degrees in ALL]
     dt = STEPS.get(noise.kind, 2e-3)
@@ -58,6 +62,7 @@ class Settled(NamedTuple):
     right: np.ndarray
     left: np.ndarray
     climb: float  # mm/s, of right-handed pairs, over the last half
+    descent: float  # mm/s, the rate of left-handed ones, negative where they descend
     held: tuple[int, int]  # right- and left-handed pairs that held together
     opened: float  # mm, by which the shift of a right-handed pair differs from that at the start
 
@@ -68,21 +73,31 @@ class Settled(NamedTuple):
 
 
 def settled(
-    noise: Disturbance, duration: float, tilt: float = 7.0, length: float = 16.0
+    noise: Disturbance,
+    duration: float,
+    tilt: float = 7.0,
+    length: float = 16.0,
+    friction: Friction = TEXT,
 ) -> Settled:
     """Return what noise makes of the ten pairs; those that came apart are left out of means."""
-    paths, half = disturbed_dyads(noise, duration, tilt, length), len(ANGLES)
+    paths, half = disturbed_dyads(noise, duration, tilt, length, friction), len(ANGLES)
     whole = np.isinf(paths.lifetimes)
     late = np.degrees(paths.heading[paths.times >= 0.75 * duration]).mean(axis=0)
     late[~whole] = np.nan
     changed = np.abs(paths.shift[-1] - paths.shift[0])[:half]
+    rates = paths.climb_rates(after=duration / 2)
     return Settled(
         right=late[:half][whole[:half]],
         left=late[half:][whole[half:]],
-        climb=float(paths.climb_rates(after=duration / 2)[:half][whole[:half]].mean()),
+        climb=_mean(rates[:half][whole[:half]]),
+        descent=_mean(rates[half:][whole[half:]]),
         held=(int(whole[:half].sum()), int(whole[half:].sum())),
         opened=float(changed.max()),
     )
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else math.nan
 
 
 def dyads(

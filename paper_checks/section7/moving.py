@@ -14,7 +14,7 @@ import numpy as np
 
 from paper_checks.appendixA.forces import judged
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.framework.disturbances import Disturbance
+from paper_checks.framework.disturbances import TEXT, Disturbance, Friction
 from paper_checks.section7.driven import (
     ANGLES,
     CHATTER,
@@ -74,9 +74,9 @@ class Wandering(NamedTuple):
     turned: float  # the range of all first headings over that of the last ones
 
 
-def wandering(noise: Disturbance, duration: float) -> Wandering:
+def wandering(noise: Disturbance, duration: float, friction: Friction = TEXT) -> Wandering:
     """Return how far pairs depart from what they have come to, in the last quarter of the time."""
-    paths, count = disturbed_dyads(noise, duration), len(ANGLES)
+    paths, count = disturbed_dyads(noise, duration, friction=friction), len(ANGLES)
     late = paths.times >= 0.75 * duration
     headings, azimuths = (np.degrees(x[:, :count]) for x in (paths.heading, paths.azimuth))
     means, widths = headings[late].mean(axis=0), np.ptp(azimuths[late], axis=0)

@@ -72,9 +72,11 @@ def test_bunches_are_judged_by_how_many_have_left(monkeypatch):
         0: Verdict.HOLDS_UNDER,
         40: Verdict.REFUTED,
     }
-    assert found[40].numbers["left_0"] == found[40].numbers["left_1"] == 0
-    assert "no noise, 2 start(s)" in found[40].evidence
-    assert "shaking along the axis with 600 mm/s² at 5 to 50 Hz, 1 start(s)" in found[40].evidence
+    assert [found[40].numbers[f"left_{k}"] for k in range(3)] == [0, 0, 0]
+    told = found[40].evidence
+    assert "sliding 0.3, rolling 0.1, rubbing 0.3, no noise, 2 start(s): 0, 0 left" in told
+    assert "shaking along the axis with 600 mm/s² at 5 to 50 Hz, 1 start(s): 0 left" in told
+    assert "sliding 0.72, rolling 0.1, rubbing 0.1, no noise, 4 start(s): 0, 0, 0, 0 left" in told
     assert "0.02 s" in found[40].evidence
 
 

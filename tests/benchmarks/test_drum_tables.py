@@ -1,0 +1,83 @@
+"""Tables of the drum's studies against counts from single calls."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drum_tables import main, pooled
+
+from polycorner.dumbbells.studies import bunch
+from polycorner.dumbbells.studies.catalogue import STUDIES
+from polycorner.sweeps import read_study, sweep
+
+FOLDER = Path(__file__).parents[2] / "benchmarks" / "drum"
+GIVEN = {"count": 12, "duration": 0.2, "top": 60.0, "tilt": -20.0, "rubbing": 0.1}
+
+
+def rows(text):
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.toml")), ids=lambda f: f.stem)
+def test_studies_are_read_and_name_their_own_folder(file):
+    assert read_study(file, STUDIES).study in ("bunch", "driven")
+    text = file.read_text(encoding="utf-8")
+    assert f"benchmarks/drum/{file.name} --out out/drum/{file.stem} --resume" in text
+
+
+def test_bunches_are_told_by_sets_of_parameters(tmp_path):
+    axes = {"start": [0, 1, 3], "sliding": [0.15, 0.3]}
+    sweep(bunch, axes, fixed=GIVEN, store=str(tmp_path / "small" / "sweep.zarr"))
+    main(["small", "--stores", str(tmp_path), "--out", str(tmp_path / "tables")])
+    text = (tmp_path / "tables" / "small.md").read_text(encoding="utf-8")
+    assert text.startswith("6 of 6 starts")
+    head, _, *lines = rows(text)[:4]
+    assert [line[0] for line in lines] == ["0.15", "0.3"]
+    single = {s: [bunch(start, sliding=s, **GIVEN) for start in (0, 1, 3)] for s in (0.15, 0.3)}
+    for line in lines:
+        at, some = dict(zip(head, line, strict=True)), single[float(line[0])]
+        left = [one["left"] for one in some]
+        assert at["starts"] == "3"
+        assert at["left, start by start"] == ", ".join(map(str, left))
+        kinds = [sum(one[f"left_{k}"] for one in some) for k in ("right", "left", "single")]
+        assert at["R, L, none"] == ", ".join(map(str, kinds))
+        assert at["mean"].startswith(f"{np.mean(left):.1f}")
+    kept = json.loads((tmp_path / "tables" / "small.json").read_text(encoding="utf-8"))["runs"]
+    assert [run["left"] for run in kept] == [
+        one["left"] for pair in zip(*single.values(), strict=True) for one in pair
+    ]
+    times = [e["time"] for run in kept for e in run["exits"]]
+    assert times
+    assert max(times) <= 0.2
+    assert all(len(run["heap_at"]) == 20 for run in kept)
+
+
+def test_correlations_are_within_sets():
+    """Two sets that differ in level, in each of which more of one is less of the other."""
+    one = [{"heap_at": [k], "left": 10 - k} for k in range(4)]
+    other = [{"heap_at": [k + 100], "left": 110 - k} for k in range(4)]
+    assert pooled([one, other], "heap_at") == pytest.approx(-1.0)
+    assert np.isnan(pooled([[{"heap_at": [1], "left": 2}] * 3], "heap_at"))
+
+
+def test_pairs_have_a_row_for_each_point(tmp_path):
+    from polycorner.dumbbells.studies import driven
+
+    fixed = {"kind": "kicks", "scale": 0.003, "duration": 0.2, "dt": 0.001}
+    store = tmp_path / "few" / "sweep.zarr"
+    found = sweep(driven, {"strength": [20.0, 40.0]}, fixed=fixed, rng=1, store=str(store))
+    main(["few", "--stores", str(tmp_path), "--out", str(tmp_path)])
+    head, _, *lines = rows((tmp_path / "few.md").read_text(encoding="utf-8"))
+    assert [line[head.index("strength")] for line in lines] == ["20", "40"]
+    for k, line in enumerate(lines):
+        heading, error = (float(found[f"heading_left{e}"][k]) for e in ("", "_error"))
+        assert line[head.index("heading L")] == f"−{-heading:.2f} ± {error:.2f}°"
+        assert float(line[head.index("kept")]) == round(float(found["single_kept"][k]), 2)
+
+
+def test_a_study_that_was_not_computed_is_named(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["nothing", "--stores", str(tmp_path), "--out", str(tmp_path)])
+    assert "nothing/sweep.zarr" in capsys.readouterr().err
