@@ -96,14 +96,15 @@ def one_set_meets_all(sets: Sequence[Set] = SETS, criteria: Sequence[str] | None
         f"{friction}, {noise}: {', '.join(fails) or 'nothing'}"
         for (friction, noise, _), fails in missed.items()
     )
+    met = [{k for k, j in by.items() if j.met} for by in found.values()]
+    never = set().union(*found.values()) - set().union(*met)
     return Finding(
         Verdict.HOLDS_UNDER if good else Verdict.REFUTED,
         f"of {len(found)} sets of friction and noise each misses: {listed}",
         {f"missed_{k}": float(len(fails)) for k, fails in enumerate(missed.values())},
         "; ".join(f"{friction}, {noise}" for friction, noise, _ in good)
-        or "each observation is met by some set, none by all sets; what brings dyads to 15° makes "
-        "zigzags narrow and left-handed dyads steeper, and what leaves zigzags as wide as observed "
-        "leaves headings as they were",
+        or f"no set meets more than {max(map(len, met))} of the criteria, and no set meets: "
+        f"{', '.join(sorted(never)) or 'all at once'}",
     )
 
 

@@ -40,7 +40,11 @@ def test_a_set_has_to_meet_all_criteria(made_up):
     assert found.verdict is Verdict.HOLDS_UNDER
     assert [found.numbers[f"missed_{k}"] for k in range(3)] == [0, 1, 1]
     assert "kicks of 3 " in found.correction
-    assert together.one_set_meets_all(made_up[1:]).verdict is Verdict.REFUTED
+    others = together.one_set_meets_all(made_up[1:])
+    assert others.verdict is Verdict.REFUTED
+    assert "more than 6 of the criteria, and no set meets: all at once" in others.correction
+    never = together.one_set_meets_all(made_up[1:2])
+    assert "no set meets: headings ±15°" in never.correction
     assert "14.5°, -18.5°" in found.evidence
     some = together.one_set_meets_all(made_up[1:2], criteria=("zigzags of 5°",))
     assert some.verdict is Verdict.HOLDS_UNDER
