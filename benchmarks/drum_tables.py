@@ -47,8 +47,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         text = told_of_bunches(found) if bunches else table([*driven(found)])
         write_atomically(options.out / f"{name}.md", text.encode())
         if bunches:
-            content = json.dumps({"runs": [*runs(found)]}, indent=1)
-            write_atomically(options.out / f"{name}.json", content.encode())
+            content = ",\n".join(map(json.dumps, runs(found)))
+            write_atomically(
+                options.out / f"{name}.json", f'{{"runs": [\n{content}\n]}}\n'.encode()
+            )
         print(text)
 
 
