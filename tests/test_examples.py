@@ -48,7 +48,7 @@ from examples import (
     ex36_nested_corner,
     ex37_sticky_clusters,
     ex38_pinball_pockets,
-    ex38_paper_heading,
+    ex39_paper_heading,
 )
 from polycorner import Verdict, minimise, stratum_at
 from polycorner.dumbbells import DumbbellPair
@@ -82,7 +82,7 @@ def test_heading_figure(tmp_path):
 @pytest.mark.parametrize(("length", "hand", "sign"), [(16.0, "L", -1), (10.0, "R", 1)])
 def test_the_papers_heading_follows_from_two_assumptions(length, hand, sign):
     """Against the closed forms of the plane, with p across and D along; see docs/heading.md."""
-    row = ex38_paper_heading.row(length, hand)
+    row = ex39_paper_heading.row(length, hand)
     p, shift = 4.5, length - math.sqrt(36 - 4.5**2)
     expected = {
         "neither": math.atan2(2 * shift * p, shift**2 + length**2 - p**2) / 2,
@@ -100,8 +100,8 @@ def test_the_papers_heading_follows_from_two_assumptions(length, hand, sign):
 
 
 def test_the_papers_heading_is_drawn(tmp_path):
-    rows = [ex38_paper_heading.row(16.0, "R"), ex38_paper_heading.row(16.0, "L")]
-    ex38_paper_heading.draw(rows, tmp_path / "paper.png")
+    rows = [ex39_paper_heading.row(16.0, "R"), ex39_paper_heading.row(16.0, "L")]
+    ex39_paper_heading.draw(rows, tmp_path / "paper.png")
     assert (tmp_path / "paper.png").read_bytes().startswith(b"\x89PNG")
 
 

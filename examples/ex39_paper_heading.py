@@ -24,7 +24,7 @@ types of entrapment, (1, 4, 1), say: that of three contacts only the one between
 Then the heading is ``arcsin(r/l)``, and the point is not a minimum but the pass over which dyads
 open.
 
-Run it to draw the figure: ``python examples/ex38_paper_heading.py [FOLDER]``.
+Run it to draw the figure: ``python examples/ex39_paper_heading.py [FOLDER]``.
 """
 
 import math
@@ -227,4 +227,4 @@ if __name__ == "__main__":
         told = f"{one.length:4g}   {one.hand}   {one.drum:9.3f}{cases}  {one.formula:11.3f}"
         print(f"{told}  {one.single:11.3f}  {good}")
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
-    print(f"wrote {draw(rows, folder / 'ex38_paper_heading.png')}")
+    print(f"wrote {draw(rows, folder / 'ex39_paper_heading.png')}")
