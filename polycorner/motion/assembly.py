@@ -95,12 +95,18 @@ class Assembly(MechanicalSystem):
         kinds, count = mapping("kinds", self.kinds), mapping("count", self.count)
         if not kinds:
             refuse("kinds", "at least one kind of body", kinds)
+        for name, one in kinds.items():
+            instance("kinds: name", name, str)
+            instance("kinds", one, System)
+        if not isinstance(self.ties, Sequence) or isinstance(self.ties, str):
+            refuse("ties", "a sequence of ties", self.ties, TypeError)
+        object.__setattr__(self, "ties", tuple([instance("ties", tie, Tie) for tie in self.ties]))
         names("count", count, kinds)
         if missing := [name for name in kinds if name not in count]:
             refuse("count", f"a number for every kind, {missing[0]!r} included", count)
         for name, one in kinds.items():
             whole(f"count of {name!r}", count[name], least=1)
-            if instance("kinds", one, System).count != 1 or one.between is not None:
+            if one.count != 1 or one.between is not None:
                 refuse("kinds", f"one body as {name!r}, counts and contacts apart", one.count)
             if one.rheonomic:
                 refuse("kinds", f"no equations with the time for {name!r}", [*one.rheonomic])
@@ -112,9 +118,6 @@ class Assembly(MechanicalSystem):
                 refuse("exits", "none in a system whose bodies have ties", dict(one.exits))
         object.__setattr__(self, "kinds", dict(kinds))
         object.__setattr__(self, "count", {name: int(count[name]) for name in kinds})
-        if not isinstance(self.ties, Sequence):
-            refuse("ties", "a sequence of ties", self.ties, TypeError)
-        object.__setattr__(self, "ties", tuple(self.ties))
         self._order_pairs()
         _ = self.bodies
         super().__post_init__()

@@ -106,7 +106,7 @@ class Symmetry(Checked):
 
         None where relabellings are not listed and :attr:`canonical` is not given.
         """
-        given = frozenset(names)
+        given = frozenset([checks.instance("names", name, str) for name in names])
         if self.relabel is None:
             return min(tuple(sorted(renamed(given, g.names))) for g in self.group)
         return None if self.canonical is None else tuple(sorted(self.canonical(given)))
