@@ -35,6 +35,9 @@ nothing more happens, a gap is short of what was promised, ``min(0, gap_i + h bo
 more than ``BEND``, the step is solved once more with the bound raised by what is missing, a step
 of Newton's method for the gap itself.
 
+Where the impulses of an island are not found at once, gaps of closed contacts that are smaller than
+:attr:`~polycorner.motion.noise.MotionOptions.touching` are left as they are, ``bound_i = 0``.
+
 Equations are solved for until they hold at ``q_M + h v+``: on the midpoints of steps the scheme is
 SHAKE, symmetric and symplectic where forces have a potential and masses are constant ([HLW] sec.
 VII.1).  Where a step is shorter than the one before, or the first, ``q_M`` is moved onto the
