@@ -12,7 +12,15 @@ from polycorner import Friction, Manifold, Polyhedron, System, velocities
 from polycorner.bodies import Arrangement, HalfSpace, Mass, disc, sphere
 from polycorner.motion import ContactFamily, Disc, pair_coordinates
 from polycorner.motion.checkpoints import Checkpoint
-from polycorner.motion.engine.arrays import CONTACTS, OWN, RESIDUAL, TieWork, Work, declarations
+from polycorner.motion.engine.arrays import (
+    CONTACTS,
+    OWN,
+    RESIDUAL,
+    LimitWork,
+    TieWork,
+    Work,
+    declarations,
+)
 from polycorner.motion.engine.crowds import CROWD, PERIOD
 from polycorner.motion.noise import OPTIONS, Solver
 from polycorner.motion.simulation import simulate, start
@@ -72,6 +80,7 @@ def test_threads_share_no_array_in_which_something_is_in_the_making():
     serial = {"neighbours.status", "neighbours.travel", "manner.near", "pair.sort_keys"}
     serial |= {"crowd.strips", "crowd.strip_cursor", "crowd.strip_start"}
     serial |= {f"tie.{name}" for name in TieWork._fields}
+    serial |= {f"limit.{name}" for name in LimitWork._fields if name != "landing"}
     told = {f"shared.{name}" for name in ("finite", "signals", "told", "times", "worst")}
     assert whole == serial | told | {"manner.located", "manner.remedy"}
 
