@@ -45,7 +45,9 @@ def correct_curvature(model, state, work, blocks, h):
     for i in range(model.bodies):
         if island.stage[i] != SETTLED and not in_crowd(model, island, i):
             island.curves_shut[i] = correct_island(model, work, i, h)
-            if stop_slips(model, work, island.start[i], island.start[i + 1], h):
+            # Impulses that were not found do not tell what sticks.
+            found_all = island.residual[i] <= model.tolerance
+            if found_all and stop_slips(model, work, island.start[i], island.start[i + 1], h):
                 island.curves_shut[i] = 1
             found = found or island.curves_shut[i] != 0
     return found
