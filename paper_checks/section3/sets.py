@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from paper_checks.section3.together import table
+from polycorner.toolkit import write_atomically
 
 
 def main() -> None:
@@ -11,7 +12,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="a folder, for together.md")
     folder = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "together.md").write_text(table(), encoding="utf-8")
+    write_atomically(folder / "together.md", table())
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ holds for the other contacts of the island that stick.  Contacts that close in t
 along one line, where the targets differ in nothing but that.  What stuck is stopped anew, by (B),
 where a run starts with slip at a contact that sticks, and where the slip before a step is no longer
 small beside the speeds that cancel in it, as what is left of it if a body comes slowly to rest.
+All that is decided by the first solution only where it is one, to the solver's tolerance.
 
 The law with ``c = 0`` throughout holds for large islands, whose impacts are not located, crowds
 among them, whose steps are not solved; for ties, slips that depend on the time, and contacts of
