@@ -147,13 +147,17 @@ def one_dyad(
     rubbing: float = 0.3,
     height: float = 0.0,
     top: float = math.inf,
+    dt: float | None = None,
 ) -> Trajectory:
-    """Simulate a nested pair with its events; ``height`` above a bottom, if there is a top."""
+    """Simulate a nested pair with its events; ``height`` above a bottom, if there is a top.
+
+    By default in steps of 1 ms, and of 2 ms if there is a top.
+    """
     closed = math.isfinite(top)
     drum = replace(TWO, rubbing=(rubbing, rubbing), floor=closed, top=top)
     angle = math.radians(heading)
     q = drum.pair.nested(hand, heading=angle, clearance=CLEARANCE).reshape(2, 3)
     q[:, 1] += height
     noise = Noise(chatter=chatter, seed=2)
-    dt = 2e-3 if closed else 1e-3
-    return simulate(drum, drum.state(q), duration, dt, every=10, noise=noise)
+    step = dt or (2e-3 if closed else 1e-3)
+    return simulate(drum, drum.state(q), duration, step, every=10, noise=noise)
