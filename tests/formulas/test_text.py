@@ -51,6 +51,7 @@ from polycorner.landscapes import basins, landscape, search_landscape
 from polycorner.minimisation import stationary_on
 from polycorner.motion import (
     ContactFamily,
+    Drift,
     Friction,
     PairFriction,
     System,
@@ -139,6 +140,10 @@ CASES = {
     "System.potential": ("potential", lambda e, _: System(D, MOVING, e)),
     "System.forces": ("forces", lambda e, _: System(D, MOVING, forces={"x": e})),
     "System.rheonomic": ("rheonomic", lambda e, _: System(D, MOVING, rheonomic={"h": e})),
+    "System.limits": ("limits", lambda e, _: System(D, MOVING, limits={"f": e})),
+    "System.nonholonomic": ("nonholonomic", lambda e, _: System(D, MOVING, nonholonomic={"h": e})),
+    "Drift.velocity": ("velocity", lambda e, _: Drift(D, {"x": e})),
+    "Drift.limits": ("limits", lambda e, _: Drift(D, {"x": 1.0}, limits={"f": e})),
     "Friction.slip": ("slip", lambda e, _: Friction("f", (e,), Interval(0.5), "right")),
     "Friction.load": ("load", lambda e, _: Friction("f", (vx,), Interval(0.5), (e,))),
     "PairFriction.slip": ("slip", lambda e, _: PairFriction({"g": (e,)}, Interval(0.5))),
@@ -155,12 +160,11 @@ CASES = {
     "Motor.torque": ("torque", lambda e, _: Motor("J", e)),
     "Motor.speed": ("speed", lambda e, _: Motor("J", speed=e, limit=1.0)),
     "Prescribed.motion": ("motion", lambda e, _: Prescribed("J", e, limit=1.0)),
-    "Robot.system.torques": (
-        "torques",
-        lambda e, _: Robot(
-            {"a": RobotLink(), "b": RobotLink(sphere(0.1), Mass(1.0, [1, 0, 0], [1, 1, 1]))},
-            {"hinge": RobotJoint("a", "b", upper=1.0)},
-        ).system(torques={"hinge": e}),
+    "Robot.system.torques": ("torques", lambda e, _: hinged().system(torques={"hinge": e})),
+    "Robot.system.limits": ("limits", lambda e, _: hinged().system(limits={"f": e})),
+    "Robot.system.nonholonomic": (
+        "nonholonomic",
+        lambda e, _: hinged().system(nonholonomic={"h": e}),
     ),
     "Arrangement.system.forces": (
         "forces",
@@ -173,6 +177,13 @@ CASES = {
 }
 
 WALLS = box([-5, -5], [5, 5])
+
+
+def hinged():
+    links = {"a": RobotLink(), "b": RobotLink(sphere(0.1), Mass(1.0, [1, 0, 0], [1, 1, 1]))}
+    return Robot(links, {"hinge": RobotJoint("a", "b", upper=1.0)})
+
+
 DISGUISES = {
     "text": lambda text: text,
     "text of NumPy": np.str_,

@@ -504,9 +504,9 @@ def test_bad_states_and_runs_get_a_sentence():
     with pytest.raises(ValueError, match=r"dt: expected at most 0\.01 s, beyond which the motion"):
         simulate(drift, drift.state([0.0, 1.0]), 1.0, 0.1)
     with pytest.raises(TypeError, match="noise: expected a seed alone"):
-        simulate(drift, drift.state([0.0, 1.0]), 1.0, 0.01, noise=Noise(kicks={"x": 1.0}))
+        simulate(drift, drift.state([0.0, 1.0]), 1.0, 1e-3, noise=Noise(kicks={"x": 1.0}))
     with pytest.raises(ValueError, match="solver: expected tolerance, sweeps and options alone"):
-        simulate(drift, drift.state([0.0, 1.0]), 1.0, 0.01, solver=Solver(threads=2))
+        simulate(drift, drift.state([0.0, 1.0]), 1.0, 1e-3, solver=Solver(threads=2))
 
 
 def test_what_is_not_finite_is_told():

@@ -511,8 +511,9 @@ def constrained(seed):
         Friction("known", [linear(v), linear(v) - 0.1], Disc(0.4), load=3 + sp.sin(q[0])),
     )
     rest = (kinetic, 3 * linear(q), {"q1": -v[1] / 5}, friction, 0.5)
-    joined = System(Polyhedron(M, gaps, equations=equations), *rest)
-    return joined, System(Polyhedron(M, gaps), *rest), rng
+    law = "newton unlimited"  # which the programme states
+    joined = System(Polyhedron(M, gaps, equations=equations), *rest, impact=law)
+    return joined, System(Polyhedron(M, gaps), *rest, impact=law), rng
 
 
 @pytest.mark.parametrize("seed", range(12))
