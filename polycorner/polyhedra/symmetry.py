@@ -104,7 +104,7 @@ class Symmetry(Checked):
     def representative(self, names: Iterable[str]) -> tuple[str, ...] | None:
         """Return the image of a set of functions that stands for all of them, sorted.
 
-        None where relabellings are not listed and :attr:`canonical` is not given.
+        None where relabellings are not listed and ``canonical`` is not given.
         """
         given = frozenset([checks.instance("names", name, str) for name in names])
         if self.relabel is None:
