@@ -36,6 +36,8 @@ class MotionOptions(Checked):
         Part of a step to which it is halved where contacts sink in.
     dependent : float
         Sine of the angle to other equations below which one follows from them.
+    left_over : float
+        Slip of what sticks, over the speeds that cancel in it, beyond which it is stopped anew.
     """
 
     touching: float = 1e-7
@@ -51,6 +53,7 @@ class MotionOptions(Checked):
     crowd_overlap: float = 1e-3
     shortest_part: float = 1.0 / 4096.0
     dependent: float = 1e-4
+    left_over: float = 0.25
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

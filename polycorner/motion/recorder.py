@@ -18,6 +18,7 @@ from polycorner.motion.engine.arrays import (
     CONTACTS,
     DISSIPATED,
     DRIVE_WORK,
+    LEFT_OVER,
     NOISE_WORK,
     PENETRATION,
     STEPS,
@@ -61,6 +62,7 @@ def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
     N, last, pairs = sizes.N, np.iinfo(np.int64).max, sizes.N * sizes.N * sizes.G
     # Whole numbers that are neither flags nor, between two steps, free: lowest and highest.
     ranges = dict.fromkeys(FLAGS, (0, 1)) | {
+        "sticks": (0, LEFT_OVER),
         "rank": (0, N - 1),
         "body_of_rank": (0, N - 1),
         "check_due": (0, last),

@@ -7,7 +7,7 @@ From a state ``(t, q, v)`` and a step ``h``, with everything evaluated at the ha
 
     M (v+ - v_free) = sum_i J_i' lam_i + sum_b B_b' p_b,      v_free = v + h M^-1 F
     0 <= lam_i   perp   J_i v+ - bound_i >= 0
-    p_b in L_b C_b   and   -(B_b v+ + d_b) normal to L_b C_b at p_b
+    p_b in L_b C_b   and   -(B_b v+ + d_b - c_b) normal to L_b C_b at p_b
 
 ======================================  =====================================================
 ``bound_i = d / 2 - e_i (J_i v          contact ``i`` closes in this step and bounces by
@@ -35,6 +35,9 @@ nothing more happens, a gap is short of what was promised, ``min(0, gap_i + h bo
 more than ``BEND``, the step is solved once more with the bound raised by what is missing, a step
 of Newton's method for the gap itself.
 
+Where the impulses of an island are not found at once, gaps of closed contacts that are smaller than
+:attr:`~polycorner.motion.noise.MotionOptions.touching` are left as they are, ``bound_i = 0``.
+
 Equations are solved for until they hold at ``q_M + h v+``: on the midpoints of steps the scheme is
 SHAKE, symmetric and symplectic where forces have a potential and masses are constant ([HLW] sec.
 VII.1).  Where a step is shorter than the one before, or the first, ``q_M`` is moved onto the
@@ -45,6 +48,10 @@ velocity, and an impulse ``p >= 0`` with ``p f = 0`` at ``q_M + h v+ / 2``, ``v+
 the step; where it falls by a step, this is located, and the velocity projected onto it in the
 metric of the masses.  A nonholonomic equation ``f = 0`` holds at ``q_M`` and the mean velocity, so
 that it does no work ([MP]).
+
+Friction acts at the mean slip of a step, ``c_b = -(B_b v + d_b)``, or, where slip stops, so that it
+vanishes at the end of the step, where the bodies are then; see
+:mod:`polycorner.motion.engine.mean_slip`.
 
 Slip that reverses within a step was zero within it, and there it is the static set that decides
 whether it starts again: such a step is solved anew with the static set.
@@ -115,8 +122,11 @@ def simulate(
     Each step solves the inclusion stated in :mod:`polycorner.motion.simulation` ([Moreau], [AB]);
     of a :class:`~polycorner.Drift` it projects the displacement that is wished ([Moreau77]), and
     ``path.v`` and forces are those admitted at each instant, not means over a step.
-    Smooth motion, impacts and the loss of contact are of second order in ``dt``; the onset of slip
-    is located to first order.
+    Smooth motion, impacts and the loss of contact are of second order in ``dt``; so are sliding
+    whose direction turns, and rolling and sticking on surfaces that curve.  What goes on to stick
+    does no work.  The instants at which slip begins or ends are located to first order.  Of first
+    order are also the directions of slip in islands of more than 48 unilateral and friction
+    contacts, at contacts of sharp hulls, and of slips that depend on the time.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from polycorner import Friction, Manifold, Polyhedron, System, simulate, velocities
-from polycorner.motion import EventKind, Interval, accelerations, time_symbol
+from polycorner.motion import Disc, EventKind, Interval, accelerations, time_symbol
 from polycorner.motion.noise import Solver
 
 LINE, PLANE = Manifold.euclidean("x"), Manifold.euclidean("x y")
@@ -55,9 +55,11 @@ def turned(t, y):
     return c * np.cos(phi), c * np.sin(phi), 2 * np.sin(t - phi) / c
 
 
-def under_a_turning_force(dt):
+def under_a_turning_force(dt, **more):
     c = 1 + sympy.Rational(3, 10) * sympy.sin(PX)
-    system = in_plane(2 * sympy.cos(T), 2 * sympy.sin(T), limits={"speed": c**2 - VX**2 - VY**2})
+    system = in_plane(
+        2 * sympy.cos(T), 2 * sympy.sin(T), limits={"speed": c**2 - VX**2 - VY**2}, **more
+    )
     return simulate(system, system.state([0, 0], [1, 0]), 2.0, dt, every=1)
 
 
@@ -77,6 +79,26 @@ def test_a_turning_force_is_followed_to_second_order_and_the_limit_to_rounding()
         assert path.converged
         assert path.audit < ROUNDING
         assert [e.kind for e in path.events] == [EventKind.ACTED]
+
+
+def test_friction_that_turns_with_a_limit_is_of_second_order():
+    """It acts along the way, where the limit takes up what is left of the force."""
+    rub = 0.2
+
+    def rate(t, y):
+        return *turned(t, y[:3]), rub * limit(y[0])
+
+    x, y, phi, heat = solve_ivp(rate, (0, 2), [0, 0, 0, 0], rtol=1e-12, atol=1e-13).y[:, -1]
+    exact = np.array([x, y, limit(x) * np.cos(phi), limit(x) * np.sin(phi), heat])
+
+    def end(dt):
+        path = under_a_turning_force(dt, friction=[Friction("rub", (VX, VY), Disc(1), load=rub)])
+        assert path.converged
+        assert path.audit < ROUNDING
+        assert (np.hypot(*path.v[:, 0].T) - limit(path.q[:, 0, 0])).max() <= ROUNDING
+        return np.concatenate([path.q[-1, 0], path.v[-1, 0], sum(path.dissipated.values())[-1:]])
+
+    assert halved(end, exact, 0.1, levels=6) == pytest.approx(2, abs=0.1)
 
 
 def test_a_limit_begins_and_ceases_to_act_where_it_is_met():
@@ -294,6 +316,29 @@ def test_a_skate_on_a_slope_runs_on_a_cycloid():
         assert np.ptp(path.kinetic + path.potential) < ROUNDING
         assert abs(path.work["skate"]).max() < ROUNDING
         assert path.touching[-1][0][:2] == ((0,), "skate")
+
+
+def test_a_skate_that_rubs_loses_what_friction_takes_along_its_way():
+    """Along itself it goes at ``1 - sin(t) / 2 - rub t``, always forwards."""
+    rub, t_end = 0.05, 3.0
+    system = System(
+        Polyhedron(SKATER, {"far": SX + 1000}),
+        (UX**2 + UY**2 + TURN**2) / 2,
+        SX / 2,
+        nonholonomic={"skate": ALONG},
+        friction=[Friction("rub", (UX, UY), Disc(1), load=rub)],
+    )
+    speed = 1 - math.sin(t_end) / 2 - rub * t_end
+    way = t_end + (math.cos(t_end) - 1) / 2 - rub * t_end**2 / 2
+    exact = np.array([speed * math.cos(t_end), speed * math.sin(t_end), rub * way])
+
+    def end(dt):
+        path = simulate(system, system.state([0, 0, 0], [1, 0, 1]), t_end, dt, every=1)
+        assert path.audit < ROUNDING
+        assert abs(path.work["skate"]).max() < ROUNDING
+        return np.append(path.v[-1, 0, :2], sum(path.dissipated.values())[-1])
+
+    assert halved(end, exact, 0.1) == pytest.approx(2, abs=0.1)
 
 
 def test_an_equation_with_the_time_drives():

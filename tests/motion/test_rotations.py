@@ -259,7 +259,7 @@ class TestDiscs:
             errors.append(abs(axes[:, 2] - math.cos(tilt)).max())
             radius = abs(spin) / rate
             assert np.ptp(path.q[:, 0, 0]) == pytest.approx(2 * radius, abs=2e-2)
-        assert errors[1] < 0.6 * errors[0]  # first order: the directions of slip turn
+        assert errors[1] < 0.3 * errors[0]  # second order, although directions of slip turn
         assert errors[1] < 2e-3
 
     def test_upright_it_rolls_straight(self):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from reference_step import solve_step
-from step_inclusion import FrictionBlock, StepProblem
+from step_inclusion import FrictionBlock, StepProblem, aimed, stopped
 
 from polycorner.dumbbells import drum_formulas
 from polycorner.dumbbells.drum import GRAVITY
@@ -117,6 +117,11 @@ def reference_motion(drum, q, v, sticks, dt, steps):
         after = solve_step(problem).velocity
         problem, turned = _turned(drum, problem, after)
         after = solve_step(problem).velocity if turned else after
+        there = _problem(drum, problem.middle, after, sticks, (n + 0.5) * dt, dt)
+        at_end = np.concatenate([b.slip(after) for b in there.blocks])
+        anew = stopped(problem, after, np.empty(0), at_end, same=1e-8)
+        if anew is not None:
+            problem, after = anew, solve_step(anew).velocity
         slips = [np.linalg.norm(b.matrix @ after + b.drift) for b in problem.blocks]
         sticks = [slip < 1e-8 for slip in slips]
         q, v = problem.middle + dt / 2 * after, after
@@ -141,7 +146,8 @@ def _problem(drum, q, v, sticks, t, dt):
     for i, load in enumerate((*both, both.sum())):
         matrix = slope[rows[i], 2:]
         shape = _sets(drum, sticks[i])[i]
-        blocks.append(FrictionBlock(matrix, value[rows[i]] - matrix @ v, shape, dt * load, -1))
+        block = FrictionBlock(matrix, value[rows[i]] - matrix @ v, shape, dt * load, -1)
+        blocks.append(aimed(block, v, stuck=bool(sticks[i])))
     none, free = np.empty(0), v + dt * force(drum, middle, t) / mass
     rest = none, np.empty((0, 4)), none, none
     return StepProblem(np.diag(mass), v, free, middle, *rest, tuple(blocks))
@@ -151,7 +157,7 @@ def _turned(drum, problem, after):
     """Return the step with static sets where slip reversed, and whether it did anywhere."""
     blocks, found = [], False
     for block, static in zip(problem.blocks, _sets(drum, static=True), strict=True):
-        slips = [block.matrix @ x + block.drift for x in (problem.v, after)]
+        slips = [block.slip(x) for x in (problem.v, after)]
         reverses = block.shape != static and float(slips[0] @ slips[1]) < 0
         blocks.append(replace(block, shape=static) if reverses else block)
         found = found or reverses

@@ -16,7 +16,7 @@ A step takes tens of milliseconds.  It is the yardstick of the compiled step, no
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -26,6 +26,8 @@ from step_inclusion import (
     StepProblem,
     assemble,
     bent_shut,
+    slips_at_end,
+    stopped,
     turned_back,
 )
 from step_residual import NO_LOAD, compliance, natural_residual, nearest, speed
@@ -101,9 +103,13 @@ def reference_step(system: System, state: State, dt: float) -> State:
     0.2057
     """
     problem, v = _turned(system, assemble(system, state, dt))
-    if (bent := bent_shut(system, problem, v, dt)) is not None:
-        problem, v = _turned(system, bent)
+    pressed = solve_step(problem).normal
     whole = STICKING * speed(problem, v)
+    at_end = slips_at_end(system, problem, v, dt)
+    anew = stopped(problem, v, pressed, at_end, same=whole) or problem
+    anew = bent_shut(system, replace(problem, blocks=anew.blocks), v, dt) or anew
+    if anew is not problem:
+        problem, v = _turned(system, anew)
     slips = [np.linalg.norm(b.matrix @ v + b.drift) for b in problem.blocks]
     sizes = [1 / np.sqrt(compliance(problem, b.matrix)) for b in problem.blocks]
     sticking = np.array(

@@ -35,6 +35,14 @@ PLAIN, SMALL, BENT = range(3)
 # is apart from the contact that presses on it looks at its impulse.
 STRIPS, AROUND, WATCHED = range(3)
 
+# The slip at which friction is solved: that at the end of the step; the mean one; the mean one, of
+# what stuck before; that at the end, where the bodies are then.
+AT_END, AT_MEAN, HOLDS, STOPS = range(4)
+
+# Of a contact that sticks, but may slip where the bodies are: at the start of a run, and after a
+# step with the law `AT_END`.
+LEFT_OVER = 2
+
 # What follows if an island is not solved: nothing; shorter steps; halves of this part of a step.
 LAST, DIVIDED, HALVED = range(3)
 
@@ -110,6 +118,7 @@ class Model(NamedTuple):
     pressing_gap: Annotated[Any, whole("F")]  # gap whose contact presses, or -1
     load_sources: Annotated[Any, whole("F L")]  # whether a known load presses
     friction_causes: Annotated[Any, whole("F")]  # cause under which its dissipation is booked
+    friction_turns: Annotated[Any, whole("F")]  # whether its slip is asked for at the mean
     set_kinds: Annotated[Any, whole("*")]
     set_sizes: Annotated[Any, real("* 4")]
     first_vertex: Annotated[Any, whole("*")]  # of each set, and one more
@@ -135,7 +144,8 @@ class Model(NamedTuple):
     most_pair_gaps: Annotated[Any, whole()]  # G
     first_law: Annotated[Any, whole("J+1")]  # of the laws of friction at each of these
     first_pair_slip: Annotated[Any, whole("J")]
-    pair_slips: Annotated[Any, whole("* 3")]  # address, whether bodies are exchanged, parameters
+    # Address, whether bodies are exchanged, parameters, whether they are asked for at the mean.
+    pair_slips: Annotated[Any, whole("* 4")]
     law_start: Annotated[Any, whole("H")]  # first slip row of each law, among those of its family
     law_rows: Annotated[Any, whole("H")]  # number of its slip rows
     pair_sets: Annotated[Any, whole("H 2")]  # static and dynamic set
@@ -169,6 +179,7 @@ class Model(NamedTuple):
     slow_bounce: Annotated[Any, real()]
     shortest_part: Annotated[Any, real()]
     dependent: Annotated[Any, real()]
+    left_over: Annotated[Any, real()]
     near: Annotated[Any, real()]  # scaled travel in a step up to which a plastic impact is slow
     near_many: Annotated[Any, real()]  # the same for bodies in a crowd
     constant_mass: Annotated[Any, whole("A")]  # whether the mass matrix is constant
@@ -222,7 +233,7 @@ class EngineState(NamedTuple):
 
     q: Annotated[Any, real("N k")]  # coordinates
     v: Annotated[Any, real("N k")]  # velocities
-    sticks: Annotated[Any, whole("F")]  # whether a friction contact with the surroundings sticks
+    sticks: Annotated[Any, whole("F")]  # whether friction with the surroundings sticks; LEFT_OVER
     friction: Annotated[Any, real("F 2")]  # its impulse
     normal: Annotated[Any, real("U")]  # normal impulses of contacts with the surroundings
     touches: Annotated[Any, whole("U")]  # whether they touch
@@ -417,6 +428,8 @@ class BlockWork(NamedTuple):
     load: Annotated[Any, real("B")]  # known load; how much curvature closes a gap; |J| of a limit
     bound: Annotated[Any, whole("B")]  # of a gap: PLAIN, SMALL or BENT
     offset: Annotated[Any, real("B 2")]  # d of the row velocities u = J v + d
+    target: Annotated[Any, real("B 2")]  # c of friction, whose law reads u - c
+    law: Annotated[Any, whole("B")]  # AT_END, ...; of a gap AT_MEAN if it was open or bounces
     before: Annotated[Any, real("B 2")]  # J v before the step
     free: Annotated[Any, real("B 2")]  # J v after forces alone
     after: Annotated[Any, real("B 2")]  # u after the step, as of the last residual
@@ -448,7 +461,7 @@ class SearchWork(NamedTuple):
     reversed: Annotated[Any, whole("B")]  # whether slip changed direction in this step
     best: Annotated[Any, real("B 2")]  # impulses of the least residual; Newton direction
     initial: Annotated[Any, real("B 2")]  # impulses before an equilibrium was sought
-    rigid: Annotated[Any, real("B 2")]  # impulses before a continuation; bounds before a grip
+    rigid: Annotated[Any, real("B 2")]  # impulses, bounds or targets before an attempt
     loaded: Annotated[Any, real("B 2")]  # impulses for known loads
     carries: Annotated[Any, real("B")]  # whether a block can carry load at rest
     derivative: Annotated[Any, real("B 9")]  # G, for the contact that presses and the block's rows

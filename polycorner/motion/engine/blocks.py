@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from polycorner.formulas.compilation import call_kernel, never_inline
+from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import (
+    AT_END,
+    AT_MEAN,
     OWN_FRICTION,
     OWN_GAP,
     OWN_LIMIT,
@@ -15,6 +17,7 @@ from polycorner.motion.engine.arrays import (
     TIE_GAP,
 )
 from polycorner.motion.engine.bounds import (
+    STRAIGHT,
     acts,
     curvature_change,
     equation_offset,
@@ -24,12 +27,14 @@ from polycorner.motion.engine.bounds import (
 from polycorner.motion.engine.evaluation import (
     ALONE,
     TOGETHER,
+    call_pair_slips,
     evaluate_gaps,
     evaluate_slips,
     evaluate_wanted_gaps,
 )
 from polycorner.motion.engine.families import coordinates_of, family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
+from polycorner.motion.engine.mean_slip import aim
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rows import (
     apply_impulses,
@@ -40,8 +45,6 @@ from polycorner.motion.engine.rows import (
 )
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import entry, load, store, zeros
-
-STRAIGHT = 1e-6  # of a step: parts in which the curvature of equations is nothing
 
 
 @compiled
@@ -136,8 +139,9 @@ def new_block(block, b, first, second, rows):
     # All that is not set for every kind of block: numbers of blocks change from step to step.
     block.bilateral[b], block.pressing[b], block.bound[b] = ZERO, -1, PLAIN
     block.load[b] = block.returned[b] = 0.0
+    block.law[b] = AT_END
     for r in range(2):
-        block.offset[b, r] = 0.0
+        block.offset[b, r] = block.target[b, r] = 0.0
         block.impulse[b, r] = 0.0
 
 
@@ -202,6 +206,7 @@ def add_body_blocks(model, state, work, i, h, limit, count):
                 model, manner, gap, closed, before, free, change, model.restitution[g], h
             )
             block.offset[b, 0] = -least
+            block.law[b] = AT_END if closed and not block.bounces[b] else AT_MEAN
             block.bound[b] = kind_of_bound(model, closed, gap + change)
         block.load[b] = -change
         block.origin[b, 0], block.origin[b, 1], block.origin[b, 2] = OWN_GAP, i, g
@@ -236,6 +241,8 @@ def add_body_blocks(model, state, work, i, h, limit, count):
             block.load[b] = mid.load[f]
         block.origin[b, 0], block.origin[b, 1], block.origin[b, 2] = OWN_FRICTION, i, f
         finish_block(model, mid, velocity, body, block, b)
+        if model.friction_turns[f]:
+            aim(model, velocity, block, b, state.sticks[f], h)
     return count
 
 
@@ -267,6 +274,7 @@ def add_pair_blocks(model, state, work, contact, h, count):
         model, manner, gap, closed, before, free, change, bounce, h
     )
     block.offset[n, 0] = -least
+    block.law[n] = AT_END if closed and not block.bounces[n] else AT_MEAN
     block.load[n] = -change
     block.bound[n] = kind_of_bound(model, closed, gap + change)
     block.origin[n, 0], block.origin[n, 1], block.origin[n, 2] = PAIR_GAP, contact, g
@@ -274,36 +282,25 @@ def add_pair_blocks(model, state, work, contact, h, count):
     finish_block(model, work.mid, velocity, body, block, n)
     if model.first_law[family] == model.first_law[family + 1]:
         return count + 1
-    return add_friction(model, state, work, contact, n)
+    return add_friction(model, state, work, contact, n, h)
 
 
 @compiled
-def add_friction(model, state, work, contact, pressing):
+def add_friction(model, state, work, contact, pressing, h):
     """Append the blocks of friction at a contact after that which presses; return the count."""
     mid, pair, block = work.mid, work.pair, work.block
     K, values = model.lanes, work.scratch.values
     i, j, g = pair.contact[contact, 0], pair.contact[contact, 1], pair.contact[contact, 2]
     family = family_of(model, i, j)
     slip, reads = model.first_pair_slip[family] + g, pair_inputs(model, family)
+    turns = model.pair_slips[slip, 3] != 0
     first_law, last_law = model.first_law[family], model.first_law[family + 1]
     # One kernel serves both orders of two bodies, so that a pair has the same bits whichever comes
     # first.
     first, second = (j, i) if model.pair_slips[slip, 1] else (i, j)
     one, two = coordinates_of(model, first), coordinates_of(model, second)
-    for a in range(reads):
-        read = model.first_read[family] + a
-        which = first if model.pair_reads[read, 0] == 0 else second
-        values[a] = mid.q[which, model.pair_reads[read, 1]]
-    for c in range(one):
-        values[reads + c] = state.v[first, c]
-    for c in range(two):
-        values[reads + one + c] = state.v[second, c]
-    start, base = values.ctypes.data, model.parameters.ctypes.data
-    v0 = reads + one + two
+    v0 = call_pair_slips(model, work.scratch, first, second, slip, mid.q, state.v)
     j0 = v0 + model.law_start[last_law - 1] + model.law_rows[last_law - 1]
-    known = base + 8 * model.pair_slips[slip, 2]
-    told = work.scratch.told.ctypes.data
-    call_kernel(model.pair_slips[slip, 0], start, known, start + 8 * v0, start + 8 * j0, told)
     index = pair.before[contact]
     stuck = state.pair_flags[index, 0] if index >= 0 else ZERO
     for f in range(first_law, last_law):
@@ -320,10 +317,13 @@ def add_friction(model, state, work, contact, pressing):
                 value -= slope * values[reads + c]
             block.offset[b, r] = value
             block.impulse[b, r] = pair.impulse[contact, 1 + row]
-        block.set[b] = model.pair_sets[f, 0 if stuck >> (f - first_law) & 1 else 1]
+        held = stuck >> (f - first_law) & 1
+        block.set[b] = model.pair_sets[f, 0 if held else 1]
         block.pressing[b] = pressing
         block.origin[b, 0], block.origin[b, 1], block.origin[b, 2] = PAIR_FRICTION, contact, f
         finish_block(model, mid, work.velocity, work.body, block, b)
+        if turns:
+            aim(model, work.velocity, block, b, held, h)
     return pressing + 1 + last_law - first_law
 
 

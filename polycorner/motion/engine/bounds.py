@@ -6,6 +6,7 @@ from polycorner.motion.engine.jit import ONE, ZERO, compiled
 
 INSTANT = 1e-9  # of a step: the shortest part, for an impact
 BRIEF = 4.0 * INSTANT  # of a step: parts whose impulses say nothing about the forces that follow
+STRAIGHT = 1e-6  # of a step: parts in which nothing curves or turns
 
 
 @compiled

@@ -3,7 +3,9 @@
 import numpy as np
 
 from polycorner.motion.engine.arrays import (
+    AT_END,
     CONTACTS,
+    LEFT_OVER,
     OWN_FRICTION,
     OWN_GAP,
     OWN_LIMIT,
@@ -16,9 +18,9 @@ from polycorner.motion.engine.bounds import BRIEF, contact_of, will_bounce
 from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.limits import evaluate_limits, limit_value
+from polycorner.motion.engine.mean_slip import goes_on_sticking
 from polycorner.motion.engine.neighbours import bodies_of, key_of
 from polycorner.motion.engine.paths import release_time
-from polycorner.motion.engine.rows import sticks
 
 MADE, LOST, IMPACT = np.int64(0), np.int64(1), np.int64(2)  # as in EventKind
 REST, MOTION, EXIT, FAILED = np.int64(3), np.int64(4), np.int64(5), np.int64(6)
@@ -104,9 +106,11 @@ def observe_block(model, state, work, b, h, time, sums):
     if not takes_part(body, block, b):
         return
     if kind == OWN_FRICTION:
-        state.sticks[g] = 1 if sticks(model, body, block, b) else 0
+        state.sticks[g] = 1 if goes_on_sticking(model, body, block, b) else 0
+        if state.sticks[g] and model.friction_turns[g] and block.law[b] == AT_END:
+            state.sticks[g] = LEFT_OVER
     elif kind == TIE_FRICTION:
-        state.tie_sticks[g] = 1 if sticks(model, body, block, b) else 0
+        state.tie_sticks[g] = 1 if goes_on_sticking(model, body, block, b) else 0
     if kind == OWN_LIMIT:
         observe_limit(model, state, work, b, h, time)
         return
@@ -278,7 +282,7 @@ def add_contacts(model, state, body, pair, block, event, begin, end, kept, share
         for law in range(model.first_law[family], model.first_law[family + 1]):
             which = law - model.first_law[family]
             f = b + 1 + which
-            if sticks(model, body, block, f):
+            if goes_on_sticking(model, body, block, f):
                 state.pair_flags[size, 0] |= ONE << which
             one, two = ZERO, K
             if block.bodies[f, 0] != block.bodies[b, 0]:

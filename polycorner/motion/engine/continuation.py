@@ -29,7 +29,7 @@ from polycorner.motion.engine.island_matrix import (
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
 from polycorner.motion.engine.newton import newton_steps
-from polycorner.motion.engine.rows import load_on, velocity_of
+from polycorner.motion.engine.rows import load_on, slip_to_target, velocity_of
 from polycorner.motion.engine.sets import project
 from polycorner.motion.engine.signals import increase
 
@@ -95,7 +95,7 @@ def press_all(model, velocity, block, search, first, last, softness):
 def press(model, block, search, b, softness):
     """Find the impulses of a block from its velocities, and their derivative."""
     rho, derivative = block.delassus[b, 3] / softness, search.derivative
-    x = search.initial[b, 0] - rho * block.after[b, 0]
+    x = search.initial[b, 0] - rho * slip_to_target(block, b, 0)
     for a in range(9):
         derivative[b, a] = 0.0
     block.impulse[b, 1] = 0.0
@@ -105,7 +105,7 @@ def press(model, block, search, b, softness):
         derivative[b, 4] = rho if acts else 0.0
         return
     out, two = search.projection[b], block.rows[b] == 2
-    y = search.initial[b, 1] - rho * block.after[b, 1] if two else 0.0
+    y = search.initial[b, 1] - rho * slip_to_target(block, b, 1) if two else 0.0
     project(model, block.set[b], x, y, load_on(block, b), out)
     block.impulse[b, 0], derivative[b, 4] = out[0], rho * out[2]
     if two:
@@ -178,7 +178,7 @@ def pull(model, block, search, scratch, first, last, softness, t):
     for s in range(first, last):
         b = block.order[s]
         rho, wx = block.delassus[b, 3] / softness, search.constant[b, 0]
-        x = search.initial[b, 0] - rho * (block.after[b, 0] + t * wx)
+        x = search.initial[b, 0] - rho * (slip_to_target(block, b, 0) + t * wx)
         if block.rows[b] == 0:
             if x > 0.0 or block.bilateral[b]:
                 total += wx * x
@@ -187,7 +187,7 @@ def pull(model, block, search, scratch, first, last, softness, t):
             continue
         two = block.rows[b] == 2
         wy = search.constant[b, 1] if two else 0.0
-        y = search.initial[b, 1] - rho * (block.after[b, 1] + t * wy) if two else 0.0
+        y = search.initial[b, 1] - rho * (slip_to_target(block, b, 1) + t * wy) if two else 0.0
         project(model, block.set[b], x, y, load_on(block, b), out)
         total += wx * out[0] + wy * out[1]
     return total

@@ -11,12 +11,12 @@ from polycorner.motion.engine.arrays import (
     SETTLED,
     TIE_GAP,
 )
-from polycorner.motion.engine.blocks import STRAIGHT
-from polycorner.motion.engine.bounds import equation_offset
+from polycorner.motion.engine.bounds import STRAIGHT, equation_offset
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps, evaluate_pair_gaps, settled
 from polycorner.motion.engine.families import family_of, pair_inputs
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
+from polycorner.motion.engine.mean_slip import stop_slips
 from polycorner.motion.engine.neighbours import speed_of
 from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.paths import tie_code
@@ -30,6 +30,7 @@ MISSED = 1e-12  # scaled gap up to which an equation holds
 def correct_curvature(model, state, work, blocks, h):
     """Raise the velocity bounds of gaps that close by their curvature; return whether any does.
 
+    So it is with friction whose slip stops, which then has to vanish at the end of the step.
     The linearised gap misses what curvature adds within the step.  The bound becomes that of
     Newton's method for the gap itself.  Pairs of bodies are examined only if they move fast enough,
     and crowds are left as they are.
@@ -44,6 +45,10 @@ def correct_curvature(model, state, work, blocks, h):
     for i in range(model.bodies):
         if island.stage[i] != SETTLED and not in_crowd(model, island, i):
             island.curves_shut[i] = correct_island(model, work, i, h)
+            # Impulses that were not found do not tell what sticks.
+            found_all = island.residual[i] <= model.tolerance
+            if found_all and stop_slips(model, work, island.start[i], island.start[i + 1], h):
+                island.curves_shut[i] = 1
             found = found or island.curves_shut[i] != 0
     return found
 

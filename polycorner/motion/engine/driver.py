@@ -22,6 +22,7 @@ from polycorner.motion.engine.arrays import (
     CONTACTS,
     CONTACTS_FULL,
     ISLANDS,
+    LEFT_OVER,
     NEWTON_STEPS,
     NOT_FINITE,
     PARTS,
@@ -116,8 +117,26 @@ class Engine:
             self.model.first_nonholonomic, self.model.first_limit[1:], strict=True
         ):
             self.motion.limit_acts[first:end] = 1
+        self._mark_slips()
         self._start_ties()
         self._allocate()
+
+    def _mark_slips(self) -> None:
+        """Mark contacts with surroundings that stick although they slip."""
+        motion, found, share = self.motion, [], self.model.tolerance
+        for kind, at in self.bodies.slices:
+            law, k, v = kind.body.formulation, kind.dimension, motion.v[at, : kind.dimension]
+            known = law.at(kind.body.parameters, self.start)
+            slips, slopes = law.slip_velocities(known, np.hstack([motion.q[at, :k], v]))
+            terms = slopes[:, :, k:] * v[:, None]
+            size = np.abs(terms).sum(axis=2) + np.abs(slips - terms.sum(axis=2))
+            left = np.zeros((len(v), sum(contact.rows for contact in kind.body.friction)), bool)
+            left[:, : slips.shape[1]] = np.abs(slips) > share * size
+            found.append(left.ravel())
+        if motion.sticks.size:
+            starts = self.model.slip_start[:-1]
+            slipping = np.logical_or.reduceat(np.concatenate(found), starts)
+            motion.sticks[(motion.sticks != 0) & slipping] = LEFT_OVER
 
     def _start_ties(self) -> None:
         """Let equations of ties touch, and friction of ties stick where its slip is zero."""

@@ -64,8 +64,8 @@ def contacts_remain(model, velocity, block, search, scratch, first, last, goal):
             continue
         search.carries[b] = search.carries[pressing] if pressing >= 0 else 1.0
         if search.carries[b] > 0.0 and (
-            abs(u[0]) > REST_FACTOR * goal
-            or (block.rows[b] == 2 and abs(u[1]) > REST_FACTOR * goal)
+            abs(u[0] - block.target[b, 0]) > REST_FACTOR * goal
+            or (block.rows[b] == 2 and abs(u[1] - block.target[b, 1]) > REST_FACTOR * goal)
         ):
             return False
     return True

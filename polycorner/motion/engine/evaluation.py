@@ -171,22 +171,13 @@ def evaluate_slips(model, state, mid, scratch, i):
     Kernels are called for those that are asked for.
     """
     k, values = model.dimension, scratch.values
-    start, base = values.ctypes.data, model.parameters.ctypes.data
     kind, first = kind_of(model, i), model.slip_start[model.first_friction[i]]
     for call in range(model.first_slip_call[kind], model.first_slip_call[kind + 1]):
-        address, n, m = (
-            model.slip_calls[call, 0],
-            model.slip_calls[call, 1],
-            model.slip_calls[call, 2],
-        )
-        r0, w0, p0 = model.slip_calls[call, 3], model.slip_calls[call, 4], model.slip_calls[call, 5]
+        n, m = model.slip_calls[call, 1], model.slip_calls[call, 2]
+        r0, w0, j0 = model.slip_calls[call, 3], model.slip_calls[call, 4], n + m
         if not asks_for_slips(model, mid, i, w0, m):
             continue
-        for a in range(n):
-            c = model.slip_reads[r0 + a]
-            values[a] = mid.q[i, c] if c < k else state.v[i, c - k]
-        j0 = n + m
-        call_kernel(address, start, base + 8 * p0, start + 8 * n, start + 8 * j0, start)
+        call_slips(model, scratch, i, call, mid.q, state.v)
         for o in range(m):
             # Kernels shared by several contacts have outputs that this body does not use.
             if model.slip_places[w0 + o] < 0:
@@ -207,6 +198,46 @@ def evaluate_slips(model, state, mid, scratch, i):
             # What cancels up to rounding is zero: otherwise a body on a substrate that rests would
             # creep, and never sleep.
             mid.slip_offset[r] = value if abs(value) > 1e-14 * size else 0.0
+
+
+@compiled
+def call_slips(model, scratch, i, call, q, v):
+    """Call a kernel of slips of a body; slips and derivatives follow what is read."""
+    k, values = model.dimension, scratch.values
+    start, base = values.ctypes.data, model.parameters.ctypes.data
+    n, m = model.slip_calls[call, 1], model.slip_calls[call, 2]
+    address, known = model.slip_calls[call, 0], base + 8 * model.slip_calls[call, 5]
+    for a in range(n):
+        c = model.slip_reads[model.slip_calls[call, 3] + a]
+        values[a] = q[i, c] if c < k else v[i, c - k]
+    call_kernel(address, start, known, start + 8 * n, start + 8 * (n + m), start)
+
+
+@compiled
+def call_pair_slips(model, scratch, first, second, slip, q, v):
+    """Call the kernel of slips at a gap of two bodies, in its order of them.
+
+    Return where the slips of all laws stand among the values; they follow coordinates and
+    velocities, and their derivatives follow them.
+    """
+    values, family = scratch.values, family_of(model, first, second)
+    one, two = coordinates_of(model, first), coordinates_of(model, second)
+    reads, last = pair_inputs(model, family), model.first_law[family + 1] - 1
+    for a in range(reads):
+        read = model.first_read[family] + a
+        which = first if model.pair_reads[read, 0] == 0 else second
+        values[a] = q[which, model.pair_reads[read, 1]]
+    for c in range(one):
+        values[reads + c] = v[first, c]
+    for c in range(two):
+        values[reads + one + c] = v[second, c]
+    start, base = values.ctypes.data, model.parameters.ctypes.data
+    v0 = reads + one + two
+    j0 = v0 + model.law_start[last] + model.law_rows[last]
+    known = base + 8 * model.pair_slips[slip, 2]
+    told = scratch.told.ctypes.data
+    call_kernel(model.pair_slips[slip, 0], start, known, start + 8 * v0, start + 8 * j0, told)
+    return v0
 
 
 @compiled

@@ -3,7 +3,13 @@
 import numpy as np
 
 from polycorner.motion.engine.jit import compiled
-from polycorner.motion.engine.rows import apply_impulses, copy_velocity, load_on, velocity_of
+from polycorner.motion.engine.rows import (
+    apply_impulses,
+    copy_velocity,
+    load_on,
+    slip_to_target,
+    velocity_of,
+)
 from polycorner.motion.engine.sets import contains, project
 
 EXACT = 1e-12  # determinant of two rows, over the product of their squares, to solve for both
@@ -36,6 +42,7 @@ def relax_block(model, velocity, block, scratch, b):
     load = load_on(block, b)
     shape = block.set[b]
     x, y = block.impulse[b, 0], block.impulse[b, 1]
+    u[0], u[1] = u[0] - block.target[b, 0], u[1] - block.target[b, 1]
     if block.rows[b] == 1:
         project(model, shape, x - u[0] * rho, 0.0, load, out)
         far = abs(out[0] - x) * norm
@@ -61,12 +68,12 @@ def relax_block(model, velocity, block, scratch, b):
 
 @compiled
 def yielding_velocity(block, b, compliance, u):
-    """Evaluate ``J v + d + c p / rho``: the velocities of rows that yield to their impulses.
+    """Evaluate ``J v + d - c + e p / rho``: the velocities of rows that yield to their impulses.
 
-    ``block.after`` must be ``J v + d``.
+    ``block.after`` must be ``J v + d``; ``e`` is the compliance.
     """
     for r in range(max(1, block.rows[b])):
-        u[r] = block.after[b, r]
+        u[r] = slip_to_target(block, b, r)
         if compliance > 0.0:
             u[r] += compliance * block.impulse[b, r] * block.delassus[b, 4]
 

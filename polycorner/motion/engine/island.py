@@ -218,7 +218,7 @@ def leave_errors(model, block, first, last, speed):
 
 
 @compiled
-def switch_reversed_slips(model, block, search, first, last):
+def switch_reversed_slips(model, body, block, search, first, last):
     """Give the static set to contacts whose slip reversed; return whether any was switched.
 
     Slip that reverses within a step was zero within it, where the static set decides whether the
@@ -233,7 +233,8 @@ def switch_reversed_slips(model, block, search, first, last):
         along = 0.0
         for r in range(block.rows[b]):
             along += (block.before[b, r] + block.offset[b, r]) * block.after[b, r]
-        if along < 0.0:
+        # What sticks may still go on to slip, where its slip is stopped at the end of the step.
+        if along < 0.0 and not sticks(model, body, block, b):
             search.reversed[b] = 1
             shape = set_of(model, block, b, 0)
             if shape != block.set[b]:
@@ -301,7 +302,7 @@ def solve_slipping(model, state, work, first, last, speed, again, may_rest):
     while True:
         worst = solve_acting(model, state, work, first, last, speed, again, may_rest)
         if worst > model.tolerance * speed or not switch_reversed_slips(
-            model, work.block, work.search, first, last
+            model, work.body, work.block, work.search, first, last
         ):
             return worst
 
@@ -376,7 +377,14 @@ def rests(model, state, work, first, last, speed):
                 if not state.rests[i] and far > SLOW * speed:
                     return False
                 v[i, c] = rest[c]
-    return find_equilibrium(model, state, work, first, last, speed)
+    # At rest no slip is left at the end of the step.
+    copy_impulses(block, first, last, block.target, work.search.rigid)
+    for s in range(first, last):
+        block.target[block.order[s], 0] = block.target[block.order[s], 1] = 0.0
+    if find_equilibrium(model, state, work, first, last, speed):
+        return True
+    copy_impulses(block, first, last, work.search.rigid, block.target)
+    return False
 
 
 @compiled
@@ -441,7 +449,7 @@ def find_grip_velocity(model, velocity, block, scratch, first, last, i):
         if not loaded:
             continue
         for r in range(max(1, block.rows[b])):
-            row, offset = block.jacobian[b, r, :k], block.offset[b, r]
+            row, offset = block.jacobian[b, r, :k], block.offset[b, r] - block.target[b, r]
             if model.timed:
                 offset += block.jacobian[b, r, model.dimension]
             add_square(A, row, 1.0, k)

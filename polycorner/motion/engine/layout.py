@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from polycorner.formulas.bundles import Call
 from polycorner.formulas.families import Family
@@ -20,7 +21,7 @@ from polycorner.spaces.manifold import Array
 MANY = 32  # bodies beyond which all are a crowd: parts of a step cost a look at each body
 # Of the options: lengths, which are scaled by the unit of gaps, and others.
 LENGTHS = ("touching", "parting", "zero_gap", "detection", "crowd_overlap")
-SHARES = ("bending", "slow_bounce", "shortest_part", "dependent")
+SHARES = ("bending", "slow_bounce", "shortest_part", "dependent", "left_over")
 
 
 def model_of(
@@ -168,6 +169,7 @@ def _surroundings(bodies: MovingBodies, sets: "_Sets", sizes: Sizes) -> dict[str
     friction: list[tuple[int, int, int]] = []  # of all bodies: sets, and cause
     pressing: list[int] = []
     sources: list[Array] = []
+    turns: list[NDArray[np.bool_]] = []
     for kind in bodies.kinds:
         contacts, m = kind.body.friction, len(kind.body.contacts)
         each = [
@@ -179,6 +181,7 @@ def _surroundings(bodies: MovingBodies, sets: "_Sets", sizes: Sizes) -> dict[str
             row[list(contact.loads)] = 1
         friction += kind.count * each
         sources += kind.count * [source]
+        turns += kind.count * [_turns(kind.body)]
         for _ in range(kind.count):
             pressing += [gaps[-1] + c.gap if c.gap >= 0 else -1 for c in contacts]
             rows += [c.rows for c in contacts]
@@ -196,9 +199,20 @@ def _surroundings(bodies: MovingBodies, sets: "_Sets", sizes: Sizes) -> dict[str
         "slip_start": np.cumsum(rows),
         "friction_sets": known[:, :2],
         "friction_causes": known[:, 2],
+        "friction_turns": np.concatenate(turns),
         "pressing_gap": pressing,
         "load_sources": np.concatenate(sources),
     }
+
+
+def _turns(body: MovingBody) -> NDArray[np.bool_]:
+    """Return of each friction contact whether its slip is asked for at the mean of a step."""
+    contacts, law = body.friction, body.formulation
+    of_row = [c for c, contact in enumerate(contacts) for _ in range(contact.rows)]
+    found = np.full(len(contacts), not law.is_paced)
+    for call in law.further:
+        found[[of_row[row] for row in call.rows]] = False
+    return found
 
 
 def _kernels(bodies: MovingBodies, parameters: list[float], width: int) -> dict[str, Any]:
@@ -280,14 +294,16 @@ def _pairs(bodies: MovingBodies, parameters: list[float], sets: "_Sets") -> dict
     for number, (a, b) in enumerate(bodies.families):
         family[a, b] = family[b, a] = number
     first: list[int] = []
-    slips: list[tuple[int, bool, int]] = []
+    slips: list[tuple[int, bool, int, bool]] = []
     first_slip: list[int] = []
     for one in families:
         first.append(len(parameters))
         parameters += one.parameters
         first_slip.append(len(slips))
         for slip, exchanged, values in one.slips:
-            slips.append((slip.kernel.compiled(1).point, exchanged, len(parameters)))
+            # Those of hulls are no formulas: they choose what they are the slips of.
+            turns = isinstance(slip, Family)
+            slips.append((slip.kernel.compiled(1).point, exchanged, len(parameters), turns))
             parameters += values
     laws = [law for one in families for law in one.laws]
     starts = [np.cumsum([0, *(law.rows for law in one.laws)])[:-1] for one in families]

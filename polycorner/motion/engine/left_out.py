@@ -19,7 +19,7 @@ from polycorner.motion.engine.families import family_of
 from polycorner.motion.engine.jit import NONE, compiled
 from polycorner.motion.engine.limit_blocks import mark_jumps
 from polycorner.motion.engine.neighbours import bodies_of, speed_of, travel
-from polycorner.motion.engine.partition import island_of, root_of
+from polycorner.motion.engine.partition import is_large, island_of, root_of
 from polycorner.motion.engine.paths import (
     CLEAR,
     FULL,
@@ -38,7 +38,6 @@ from polycorner.motion.engine.paths import (
 )
 from polycorner.motion.engine.ties import form_of
 
-LARGE = 48  # blocks of an island beyond which impacts need not be located
 CROWD = 2  # bodies beyond which those that are not fast need not be, either
 
 
@@ -117,12 +116,6 @@ def leave_out(model, state, work, blocks, h):
             body.waits[i] = 1
             body.awake[i], body.evaluated[i], work.sleep.disturbed[i] = 0, 0, 0
     return True
-
-
-@compiled
-def is_large(island, i):
-    """Return whether impacts need not be located in the island that a body represents."""
-    return island.start[i + 1] - island.start[i] > LARGE
 
 
 @compiled

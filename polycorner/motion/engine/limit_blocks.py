@@ -14,13 +14,12 @@ A limit has a block where it acted before, or would be passed without.
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import CHANGED, OWN_LIMIT, SETTLED
 from polycorner.motion.engine.blocks import (
-    STRAIGHT,
     finish_block,
     new_block,
     respond_to_rows,
     touch_tied,
 )
-from polycorner.motion.engine.bounds import BRIEF, INSTANT
+from polycorner.motion.engine.bounds import BRIEF, INSTANT, STRAIGHT
 from polycorner.motion.engine.families import coordinates_of, kind_of
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.limits import (

@@ -4,6 +4,14 @@ import numpy as np
 
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 
+LARGE = 48  # blocks of an island beyond which impacts need not be located
+
+
+@compiled
+def is_large(island, i):
+    """Return whether impacts need not be located in the island that a body represents."""
+    return island.start[i + 1] - island.start[i] > LARGE
+
 
 @compiled
 def root_of(root, i):

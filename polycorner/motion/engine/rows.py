@@ -4,7 +4,7 @@ A row has ``model.lanes`` numbers for each of two bodies: those of its coordinat
 whole vectors; so have all velocities that it is multiplied by.
 """
 
-from polycorner.motion.engine.jit import compiled
+from polycorner.motion.engine.jit import ZERO, compiled
 from polycorner.motion.engine.sizes import WIDTH
 from polycorner.motion.engine.vectors import load, store, total, zeros
 
@@ -25,6 +25,18 @@ def row_times(model, rows, at, v, i, j):
     if j >= 0:
         for c in range(0, K, WIDTH):
             value = value + load(rows, at + K + c) * load(v, j * K + c)
+    return total(value)
+
+
+@compiled
+def terms_square(model, rows, at, v, i, j):
+    """Return the sum of the squares of the terms of :func:`row_times`."""
+    K, value = model.lanes, zeros()
+    for side in range(2):
+        body = j if side else i
+        for c in range(0, K if body >= 0 else ZERO, WIDTH):
+            term = load(rows, at + side * K + c) * load(v, body * K + c)
+            value = value + term * term
     return total(value)
 
 
@@ -120,7 +132,14 @@ def speed_at(body, block, b):
 
 
 @compiled
+def slip_to_target(block, b, r):
+    """Return the velocity of a row that the law of its block reads, ``u - c``."""
+    return block.after[b, r] - block.target[b, r]
+
+
+@compiled
 def sticks(model, body, block, b):
-    """Return whether a friction contact sticks: its slip vanishes within the solver's accuracy."""
-    slip = abs(block.after[b, 0]) + (abs(block.after[b, 1]) if block.rows[b] == 2 else 0.0)
+    """Return whether a friction contact sticks: its slip is ``c`` within the solver's accuracy."""
+    slip = abs(slip_to_target(block, b, 0))
+    slip += abs(slip_to_target(block, b, 1)) if block.rows[b] == 2 else 0.0
     return slip <= 2.0 * model.tolerance * speed_at(body, block, b)

@@ -20,8 +20,9 @@ from polycorner.motion.engine.crowds import ABREAST, divide_blocks, is_crowd
 from polycorner.motion.engine.curvature import correct_curvature
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.limit_blocks import assemble_limits
+from polycorner.motion.engine.mean_slip import act_at_end
 from polycorner.motion.engine.neighbours import detect_all, detection_distance, order_contacts
-from polycorner.motion.engine.partition import find_islands
+from polycorner.motion.engine.partition import find_islands, is_large
 from polycorner.motion.engine.phases import items_of, share_out, share_range
 from polycorner.motion.engine.rows import apply_impulses
 from polycorner.motion.engine.signals import increase
@@ -108,6 +109,9 @@ def assemble_blocks(model, state, work, h, contacts, ascending):
 def start_blocks(model, work, blocks):
     """Apply the impulses from which the solution of a step starts, except in crowds."""
     velocity, island, block = work.velocity, work.island, work.block
+    for i in range(model.bodies):
+        if is_large(island, i):
+            act_at_end(block, island.start[i], island.start[i + 1])
     if model.crowd_sweeps == 0:
         for b in range(blocks):
             apply_impulses(model, velocity, block, b, block.impulse[b, 0], block.impulse[b, 1])

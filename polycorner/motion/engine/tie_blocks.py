@@ -5,13 +5,13 @@ import numpy as np
 from polycorner.formulas.compilation import never_inline
 from polycorner.motion.engine.arrays import LIMITS, ROWS, SLIPS, TIE_FRICTION, TIE_GAP
 from polycorner.motion.engine.blocks import (
-    STRAIGHT,
     finish_block,
     kind_of_bound,
     new_block,
     touch_tied,
 )
 from polycorner.motion.engine.bounds import (
+    STRAIGHT,
     acts,
     curvature_change,
     equation_offset,
