@@ -103,8 +103,20 @@ def test_velocities_of_dumbbells_without_friction_diffuse_by_the_strength(scale)
 def test_in_a_level_drum_left_handed_pairs_are_mirror_images(kind):
     found = results(kind, *MIRRORED[kind], tilt=0.0, spin=0.05, duration=4.0)
     assert abs(found["climb_rate_right"]) > 1e-3
-    for name, sign in {"heading": -1, "climb_rate": -1, "shift": 1, "spread": 1}.items():
-        assert found[f"{name}_left"] == pytest.approx(sign * found[f"{name}_right"], abs=5e-3)
+    for name, sign in {"heading": -1, "climb_rate": -1, "shift": 1}.items():
+        # Shaken across, nested pairs come apart and close at two contacts at once: rounding decides
+        # at which first, and from there on the mirror image is another draw of the same motion.
+        error = found[f"{name}_right_error"] if kind == "shaking across" else 1e-7
+        assert found[f"{name}_left"] == pytest.approx(sign * found[f"{name}_right"], abs=error)
+
+
+def test_pairs_that_are_shaken_gently_stay_mirror_images():
+    level = DumbbellDrum(tilt=0.0, spin=0.05)
+    drum, noise = disturbed(level, "shaking across", 300.0, 0.05, 4)
+    paths = follow_dyads(drum, [("R", 0.1), ("L", -0.1)], 0.3, noise=noise, dt=1e-3)
+    heading, azimuth = paths.heading, paths.trajectory.q[:, :, 0]
+    assert np.ptp(azimuth) > 0.01
+    assert heading[:, 1] == pytest.approx(-heading[:, 0], abs=1e-8)
 
 
 def test_pairs_are_those_that_dyads_follow():
