@@ -11,6 +11,7 @@ from polycorner.bodies.chains import clean
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.shapes import Body
 from polycorner.checks import refuse
+from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked
 
@@ -102,6 +103,7 @@ class RobotJoint(Checked):
         """Whether the links move relative to each other."""
         return self.kind != "fixed"
 
+    @checked
     def driven_by(self, name: str) -> tuple[str, float, float]:
         """Return the joint whose coordinate ``q`` places it at ``rate q + offset``, and these."""
         return self.follows or (name, 1.0, 0.0)

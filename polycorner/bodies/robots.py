@@ -434,6 +434,7 @@ class Robot(Checked):
         pull = checks.reals("gravity", [0, 0, 0] if gravity is None else gravity)
         if pull.shape != (3,) or not np.isfinite(pull).all():
             refuse("gravity", "3 finite numbers", gravity)
+        checks.real("density", density, above=0)
         given = checks.mapping("masses", {} if masses is None else masses)
         checks.names("masses", given, self.bodies)
         kinetic = potential = sympy.S.Zero

@@ -150,6 +150,8 @@ def _exits(polyhedron: Polyhedron, limited: Polyhedron, region: Any) -> tuple[st
     if again:
         checks.refuse("region", "inequalities that the polyhedron does not have", again[0])
     for function in limited.functions[len(polyhedron.functions) :]:
+        if not function.expression.free_symbols:
+            checks.refuse("region", "inequalities of coordinates", function.expression)
         check_function(function, periodic=True)
     names = limited.names[len(polyhedron.functions) :]
     always, _ = limited.unions

@@ -104,6 +104,8 @@ class Assembly(MechanicalSystem):
         names("count", count, kinds)
         if missing := [name for name in kinds if name not in count]:
             refuse("count", f"a number for every kind, {missing[0]!r} included", count)
+        if self.scene is not None:
+            instance("scene", self.scene, Scene)  # type: ignore[type-abstract]
         for name, one in kinds.items():
             whole(f"count of {name!r}", count[name], least=1)
             if one.count != 1 or one.between is not None:

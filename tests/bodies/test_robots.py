@@ -414,6 +414,10 @@ def test_what_no_robot_has_is_refused():
     light = Robot({**links, "c": RobotLink()}, chain)
     with pytest.raises(ValueError, match="a mass of 'c', or beyond it"):
         light.system()
+    with pytest.raises(TypeError, match="density: expected"):
+        light.system(density=1j)
+    with pytest.raises(TypeError, match="name: expected"):
+        RobotJoint("a", "b").driven_by(2)
     with pytest.raises(ValueError, match="placed: expected"):
         light.point({"three": 1.0})
     many = RobotLink(compound({str(k): Body(polytope(CUBE).parts) for k in range(9)}))

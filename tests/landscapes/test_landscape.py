@@ -356,6 +356,8 @@ def test_regions_are_intersections() -> None:
         landscape(DISC, X**2 + Y**2, box=SQUARE, region=[DISC.functions[0]])
     with pytest.raises(ValueError, match="region: expected"):
         landscape(DISC, X**2 + Y**2, box=SQUARE, region=[18 - 2 * X**2 - 2 * Y**2])
+    with pytest.raises(ValueError, match="region: expected inequalities of coordinates; got 0"):
+        landscape(DISC, X**2 + Y**2, box=SQUARE, region=0)
 
 
 def test_regions_on_circles_are_periodic() -> None:

@@ -324,6 +324,8 @@ def test_bad_assemblies_are_refused():
     a, b = line(1.0), line(2.0)
     with pytest.raises(ValueError, match="count: expected a number for every kind, 'b' included"):
         Assembly({"a": a, "b": b}, {"a": 1})
+    with pytest.raises(TypeError, match="scene: expected"):
+        Assembly({"a": a}, {"a": 1}, scene=1j)
     with pytest.raises(ValueError, match="count: expected names among a, b; got c"):
         Assembly({"a": a, "b": b}, {"a": 1, "c": 1})
     system = Assembly({"a": a, "b": b}, {"a": 1, "b": 2})
