@@ -35,6 +35,8 @@ from polycorner.motion import Checkpoint, Noise
 SAVE = 30.0  # s
 KICK_TIME = 0.003  # s, for which a kick is held
 AXES = ("ACROSS", "ALONG", "UP")  # directions of shaking
+FRICTION = ("sliding", "rolling", "rubbing")
+STATES = ("STATIC", "DYNAMIC")
 IN = {"right": "in right", "left": "in left"}  # dyads
 SHARES = 10  # instants at which dumbbells off the drum are counted
 
@@ -48,6 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--band", type=float, nargs=2, default=[5.0, 50.0], help="Hz")
     parser.add_argument("--oval", type=float, metavar="MM", help="amplitude of an oval wall")
     parser.add_argument("--uneven", type=float, nargs=2, metavar=("RMS", "MM"), help="friction")
+    for name in FRICTION:
+        told = f"coefficients of {name}; default: the drum's"
+        parser.add_argument(f"--{name}", type=float, nargs=2, metavar=STATES, help=told)
     parser.add_argument("--count", type=int, default=60, help="dumbbells")
     parser.add_argument("--top", type=float, default=150.0, help="length of the drum, mm")
     parser.add_argument("--duration", type=float, default=1200.0, help="s")
@@ -81,13 +86,14 @@ def imperfections(options: argparse.Namespace, start: int) -> dict[str, Any]:
         found["out_of_round"] = OutOfRound({2: options.oval})
     if options.uneven:
         found["uneven_friction"] = UnevenFriction(*options.uneven, seed=start)
-    return found
+    return found | {k: tuple(getattr(options, k)) for k in FRICTION if getattr(options, k)}
 
 
 def followed(options: argparse.Namespace, point: tuple[int, float]) -> dict[str, Any]:
     """Follow one start, or go on with it; return its figures."""
     start, kicks = point
     told = {"shaken": options.shake, "oval": options.oval, "uneven": options.uneven}
+    told |= {name: getattr(options, name) for name in FRICTION}
     told = {"kicks": kicks} | {name: value for name, value in told.items() if value}
     words = [f"{name} {value}" for name, value in told.items()]
     folder = options.out / re.sub(r"[^\w.]+", "-", " ".join([*words, f"start {start}"]))
