@@ -32,8 +32,8 @@ SETTLED, SOLVED, CHANGED = range(3)
 PLAIN, SMALL, BENT = range(3)
 
 # Of the strips of a crowd: their number; whether the first follows the last; whether friction that
-# is apart from the contact that presses on it looks at its impulse.
-STRIPS, AROUND, WATCHED = range(3)
+# is apart from the contact that presses on it looks at its impulse; whether a contact bounces.
+STRIPS, AROUND, WATCHED, BOUNCES = range(4)
 
 # The slip at which friction is solved: that at the end of the step; the mean one; the mean one, of
 # what stuck before; that at the end, where the bodies are then.
@@ -254,7 +254,8 @@ class EngineState(NamedTuple):
     pair_release: Annotated[Any, real("C")]  # when the normal impulse would vanish
     pair_action: Annotated[Any, real("C 2*k")]  # generalised impulses on both bodies
     pair_flags: Annotated[Any, whole("C 2")]  # laws that stick, as bits; whether they touch
-    cluster: Annotated[Any, whole("N", initial=-1)]  # bodies that need shorter steps: with which
+    # Bodies that need shorter steps: the first of those with which they do, plus N for a crowd.
+    cluster: Annotated[Any, whole("N", initial=-1)]
     elapsed: Annotated[Any, real("N")]  # how much of the step these have done
     watched: Annotated[Any, whole("N")]  # whether the way to the next midpoint was examined
     counts: Annotated[Any, whole("8")]
@@ -365,6 +366,7 @@ class IslandWork(NamedTuple):
     residual: Annotated[Any, real("N")]  # of the island that a body represents
     stage: Annotated[Any, whole("N")]  # of the island that a body represents: SETTLED, ...
     curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
+    sunk: Annotated[Any, whole("N")]  # of a crowd: block of a contact that is sunk in, or -1
     parent: Annotated[Any, whole("N")]  # in the union-find forest
     start: Annotated[Any, whole("N+1")]  # in `BlockWork.order`, for the body that represents it
     cursor: Annotated[Any, whole("N+1")]
@@ -510,7 +512,7 @@ class CrowdWork(NamedTuple):
     rows: Annotated[Any, real("B 2 2*K")]  # J U of the normal, and of the slip
     across_rows: Annotated[Any, real("B 2*K")]  # the same of the slip across
     order: Annotated[Any, whole("B")]  # twice a block, and whether friction follows
-    strips: Annotated[Any, whole("3")]  # STRIPS, ...
+    strips: Annotated[Any, whole("4")]  # STRIPS, ...
     body_strip: Annotated[Any, whole("N")]  # strip of a body
     strip: Annotated[Any, whole("B")]  # of what is sorted
     strip_start: Annotated[Any, whole("Z+1")]  # in `order`
@@ -524,9 +526,11 @@ class SharedWork(NamedTuple):
     booked: Annotated[Any, real("V D+6")]  # `EngineState.sums` of an item
     finite: Annotated[Any, whole("1")]  # whether velocities and gaps are numbers
     worst: Annotated[Any, real("Z")]  # residuals of parts of an island
+    gained: Annotated[Any, real("Z")]  # work of the contacts of these
+    sunk: Annotated[Any, whole("Z")]  # block of a contact of these that is sunk in, or -1
     signals: Annotated[Any, whole("32")]  # TICKET, ...
     told: Annotated[Any, whole("8")]  # KIND, ...
-    times: Annotated[Any, real("4")]  # LENGTH, ...
+    times: Annotated[Any, real("5")]  # LENGTH, ...
     to_solve: Annotated[Any, whole("N")]  # bodies that represent islands
 
 

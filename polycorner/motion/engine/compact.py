@@ -11,6 +11,7 @@ import numpy as np
 from polycorner.motion.engine.arrays import WATCHED
 from polycorner.motion.engine.families import coordinates_of, kind_of
 from polycorner.motion.engine.gauss_seidel import EXACT
+from polycorner.motion.engine.impacts import mixed, plastic_offset
 from polycorner.motion.engine.jit import NONE, ONE, TWO, ZERO, compiled
 from polycorner.motion.engine.linear_algebra import factorise
 from polycorner.motion.engine.rows import (
@@ -301,14 +302,16 @@ def judge_contact(model, block, crowd, scratch, r):
 
 @compiled
 def separate_contact(model, crowd, r):
-    """Move bodies apart that overlap, by a share of what is too much.
+    """Move bodies apart that overlap, by a share of what is too much; return whether they sank in.
 
     The changes of place, in ``crowd.unit_shift``, are as impulses would make them, but leave
-    velocities as they are.
+    velocities as they are.  Bodies have sunk in by half the thickness of the thinnest: what presses
+    them on may soon push them out on the other side.
     """
     excess = crowd.numbers[r, EXCESS]
     if excess <= 0.0:
-        return
+        return False
+    sunk = excess + model.crowd_overlap > model.gap_unit
     at, _, _ = places(model, r)
     i, j, shift = crowd.contact[r, FIRST], crowd.contact[r, SECOND], crowd.unit_shift
     # What neighbours have moved already counts, so that a row of overlaps is not taken away twice.
@@ -316,3 +319,63 @@ def separate_contact(model, crowd, r):
     if excess > 0.0:
         p = SEPARATED * excess * crowd.numbers[r, NORMAL_RHO]
         add_row(model, crowd.rows, at, p, shift, i, j)
+    return sunk
+
+
+@compiled
+def gain_contact(block, crowd, r):
+    """Return the work of a contact that was judged, and of its friction, at the mean velocity."""
+    contact, work = crowd.contact[r], 0.0
+    form = contact[FORM]
+    if form & HAS_GAP and not form & BILATERAL:
+        b = contact[BLOCK]
+        after = block.after[b, 0] - block.offset[b, 0]
+        work += block.impulse[b, 0] * 0.5 * (block.before[b, 0] + after)
+    if form & HAS_FRICTION:
+        f = friction_of(contact)
+        for t in range(TWO if form & TWO_ROWS else ONE):
+            slip = block.before[f, t] + block.offset[f, t] + block.after[f, t]
+            work += block.impulse[f, t] * 0.5 * slip
+    return work
+
+
+@compiled
+def compress_contact(block, crowd, r):
+    """Let a contact start anew, from no impulse, and be plastic.
+
+    Its impulses are kept as those of the whole impact.
+    """
+    contact, numbers = crowd.contact[r], crowd.numbers[r]
+    form, b = contact[FORM], contact[BLOCK]
+    keep_contact(block.expanded, block, crowd, r)
+    numbers[PRESSES] = numbers[RUBS] = crowd.across[r, RUBS_ACROSS] = 0.0
+    if form & HAS_GAP:
+        if block.bounces[b] and not form & BILATERAL:
+            offset = plastic_offset(block, b)
+            numbers[NORMAL] += offset - block.offset[b, 0]
+            block.offset[b, 0] = offset
+        block.impulse[b, 0] = 0.0  # the load of friction that stands apart
+
+
+@compiled
+def keep_contact(kept, block, crowd, r):
+    """Copy the impulses of a contact, and of its friction."""
+    contact = crowd.contact[r]
+    b, form = contact[BLOCK], contact[FORM]
+    kept[b, 0], kept[b, 1] = block.impulse[b, 0], block.impulse[b, 1]
+    if form & HAS_FRICTION:
+        f = friction_of(contact)
+        kept[f, 0], kept[f, 1] = block.impulse[f, 0], block.impulse[f, 1]
+
+
+@compiled
+def mix_contact(block, crowd, r, share):
+    """Set the impulses of a contact between those of the compression and of the whole impact."""
+    contact, numbers = crowd.contact[r], crowd.numbers[r]
+    form, b = contact[FORM], contact[BLOCK]
+    if form & HAS_GAP:
+        numbers[PRESSES] = block.impulse[b, 0] = mixed(block, b, 0, share)
+    if form & HAS_FRICTION:
+        f = friction_of(contact)
+        numbers[RUBS] = mixed(block, f, 0, share)
+        crowd.across[r, RUBS_ACROSS] = mixed(block, f, 1, share)

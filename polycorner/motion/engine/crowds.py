@@ -21,10 +21,15 @@ time, in steps that their numbers tell, so that motions that were saved and load
 
 import numpy as np
 
-from polycorner.motion.engine.arrays import AROUND, CONTACTS, STRIPS, WATCHED
+from polycorner.motion.engine import codes
+from polycorner.motion.engine.arrays import AROUND, BOUNCES, CONTACTS, STRIPS, WATCHED
 from polycorner.motion.engine.compact import (
     compact_contact,
+    compress_contact,
+    gain_contact,
     judge_contact,
+    keep_contact,
+    mix_contact,
     press_contact,
     relax_contact,
     separate_contact,
@@ -151,7 +156,7 @@ def divide_blocks(model, state, work, first, last, h):
     island, block, crowd = work.island, work.block, work.crowd
     count, s, apart = ZERO, first, False
     strips = divide_bodies(model, state, work.mid, work.body, crowd, h)
-    crowd.strips[WATCHED] = 0
+    crowd.strips[WATCHED] = crowd.strips[BOUNCES] = 0
     while s < last:
         b, pressed = block.order[s], ZERO
         # A contact and its friction are relaxed one after the other: together they read their
@@ -160,6 +165,8 @@ def divide_blocks(model, state, work, first, last, h):
             pressed = ONE
         if block.rows[b] > 0:
             crowd.strips[WATCHED] = 1
+        elif block.bounces[b]:
+            crowd.strips[BOUNCES] = 1
         t = strip_of(crowd, block.bodies[b, 0], block.bodies[b, 1], strips)
         island.unsorted[count], crowd.strip[count], apart = 2 * b + pressed, t, apart or t < 0
         count += 1
@@ -208,12 +215,37 @@ def sweep_strips(model, block, crowd, scratch, item, odd):
 
 @compiled
 def judge_strip(model, block, crowd, scratch, t):
-    """Move bodies apart that overlap in a strip, and return its residual."""
-    worst = 0.0
+    """Move bodies apart that overlap in a strip.
+
+    Return its residual, and the block of a contact that is sunk in, or -1.
+    """
+    worst, sunk = 0.0, NONE
     for r in range(crowd.strip_start[t], crowd.strip_start[t + 1]):
-        separate_contact(model, crowd, r)
+        if separate_contact(model, crowd, r):
+            sunk = crowd.order[r] // 2
         worst = max(worst, judge_contact(model, block, crowd, scratch, r))
-    return worst
+    return worst, sunk
+
+
+@compiled
+def gain_strip(block, crowd, t):
+    """Return the work of the contacts of a strip, which were judged."""
+    work = 0.0
+    for r in range(crowd.strip_start[t], crowd.strip_start[t + 1]):
+        work += gain_contact(block, crowd, r)
+    return work
+
+
+@compiled
+def change_strip(block, crowd, t, kind, share):
+    """Let the contacts of a strip be plastic, keep their impulses as such, or mix these."""
+    for r in range(crowd.strip_start[t], crowd.strip_start[t + 1]):
+        if kind == codes.COMPRESS:
+            compress_contact(block, crowd, r)
+        elif kind == codes.KEEP:
+            keep_contact(block.compressed, block, crowd, r)
+        else:
+            mix_contact(block, crowd, r, share)
 
 
 @compiled

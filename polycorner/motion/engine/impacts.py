@@ -64,7 +64,13 @@ def compress(block, first, last):
     for s in range(first, last):
         b = block.order[s]
         if is_unilateral(block, b) and block.bounces[b] and block.bound[b] != BENT:
-            block.offset[b, 0] = -0.5 * forced(block, b)
+            block.offset[b, 0] = plastic_offset(block, b)
+
+
+@compiled
+def plastic_offset(block, b):
+    """Return ``d`` of the bound ``J v + d >= 0`` of a contact that bounces, were it plastic."""
+    return -0.5 * forced(block, b)
 
 
 @compiled
@@ -165,22 +171,29 @@ def gain(model, velocity, block, first, last):
 
 @compiled
 def go_back(model, velocity, block, first, last, lost):
-    """Take back as much of an impact, towards its compression, as it gains.
-
-    ``lost`` is the work of the compression; what it gains, by gaps that open, may be gained.
-    """
-    most, whole = max(0.0, lost), gain(model, velocity, block, first, last)
-    if not whole > most:
+    """Take back, towards the compression, whose work is ``lost``, as much as an impact gains."""
+    whole = gain(model, velocity, block, first, last)
+    if not whole > max(0.0, lost):
         return
     copy_impulses(block, first, last, block.impulse, block.expanded)
     mix(model, velocity, block, first, last, 0.5)
     half = gain(model, velocity, block, first, last)
-    # The work is lost + b s + a s^2, with a >= 0: what begins below `most` crosses it once.
+    mix(model, velocity, block, first, last, share_without_gain(lost, half, whole))
+
+
+@compiled
+def share_without_gain(lost, half, whole):
+    """Return the greatest share of an impact, after its compression, that gains nothing.
+
+    Given are the works of contacts and friction up to the compression, with half of what follows,
+    and with all of it: too much.  What the compression gains, by gaps that open, may be gained.
+    """
+    # The work is lost + b s + a s^2, with a >= 0: what begins below the most crosses it once.
     a = 2.0 * (lost - 2.0 * half + whole)
-    b, spare = whole - lost - a, most - lost
+    b, spare = whole - lost - a, max(0.0, lost) - lost
     root = np.sqrt(max(0.0, b * b + 4.0 * a * spare))
     s = 2.0 * spare / (b + root) if b > 0.0 else (root - b) / (2.0 * a)
-    mix(model, velocity, block, first, last, min(s, 1.0))
+    return min(s, 1.0)
 
 
 @compiled
@@ -189,9 +202,15 @@ def mix(model, velocity, block, first, last, s):
     for t in range(first, last):
         b = block.order[t]
         for r in range(2):
-            p = block.compressed[b, r]
-            block.impulse[b, r] = p + s * (block.expanded[b, r] - p)
+            block.impulse[b, r] = mixed(block, b, r, s)
     recompute_velocities(model, velocity, block, first, last)
+
+
+@compiled
+def mixed(block, b, r, share):
+    """Return an impulse between that of the compression and that of the whole impact."""
+    p = block.compressed[b, r]
+    return p + share * (block.expanded[b, r] - p)
 
 
 @compiled

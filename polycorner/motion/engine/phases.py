@@ -16,7 +16,9 @@ from polycorner.motion.engine.blocks import assemble_contacts, predict_body
 from polycorner.motion.engine.compact import begin_compact, end_compact
 from polycorner.motion.engine.contact_list import add_contacts, observe_block, store_impulses
 from polycorner.motion.engine.crowds import (
+    change_strip,
     compact_strip,
+    gain_strip,
     judge_strip,
     press_strip,
     sweep_strips,
@@ -46,7 +48,11 @@ def do_item(model, state, work, item):
         press_strip(model, crowd, 2 * item + told[codes.SET_OFF])
     elif kind == codes.JUDGE:
         t = 2 * item + told[codes.SET_OFF]
-        shared.worst[t] = judge_strip(model, block, crowd, scratch, t)
+        shared.worst[t], shared.sunk[t] = judge_strip(model, block, crowd, scratch, t)
+    elif kind == codes.GAIN:
+        shared.gained[item] = gain_strip(block, crowd, item)
+    elif kind in (codes.COMPRESS, codes.KEEP, codes.MIX):
+        change_strip(block, crowd, item, kind, shared.times[codes.SHARE])
     elif kind == codes.SOLVE:
         i = shared.to_solve[item]
         first, last = island.start[i], island.start[i + 1]

@@ -2,7 +2,16 @@
 
 from polycorner.motion.engine import codes
 from polycorner.motion.engine.accounts import add_sums
-from polycorner.motion.engine.arrays import CONTACTS, ISLANDS, SETTLED, STRIPS, SWEEPS
+from polycorner.motion.engine.arrays import (
+    BOUNCES,
+    CONTACTS,
+    ISLANDS,
+    PLASTIC,
+    SETTLED,
+    STRIPS,
+    SWEEPS,
+    UNPROJECTED,
+)
 from polycorner.motion.engine.blocks import (
     assemble_body_blocks,
     assemble_contacts,
@@ -18,6 +27,7 @@ from polycorner.motion.engine.contact_list import (
 )
 from polycorner.motion.engine.crowds import ABREAST, divide_blocks, is_crowd
 from polycorner.motion.engine.curvature import correct_curvature
+from polycorner.motion.engine.impacts import share_without_gain
 from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.limit_blocks import assemble_limits
 from polycorner.motion.engine.mean_slip import act_at_end
@@ -156,22 +166,82 @@ def solve_islands(model, state, work, blocks, h, again):
 
 @compiled
 def sweep_crowd(model, state, work, i, h):
-    """Sweep over the blocks of a crowd, which is not solved, as often as asked."""
-    island, shared = work.island, work.shared
+    """Sweep over the blocks of a crowd, which is not solved, as often as asked.
+
+    It bounces by Newton's law, whatever the law of impact, and gains no energy by that; see
+    :func:`limit_crowd`.
+    """
+    island, shared, crowd = work.island, work.shared, work.crowd
     divide_blocks(model, state, work, island.start[i], island.start[i + 1], h)
-    strips = work.crowd.strips[STRIPS]
+    strips = crowd.strips[STRIPS]
     shared.told[codes.ISLAND] = i
     share_range(model, state, work, codes.BEGIN, model.bodies, h)
     share_out(model, state, work, codes.COMPACT, strips)
     speed = shared.times[codes.SPEED] = greatest(shared.worst, strips)
     share_strips(model, state, work, codes.PRESS, strips)
+    worst = sweep_all(model, state, work, strips)
+    if crowd.strips[BOUNCES] and model.impact not in (UNPROJECTED, PLASTIC):
+        worst = max(worst, limit_crowd(model, state, work, strips, h))
+    share_range(model, state, work, codes.END, model.bodies, h)
+    island.sunk[i] = NONE
+    for t in range(strips):
+        if shared.sunk[t] >= 0:
+            island.sunk[i] = shared.sunk[t]
+    increase(state.counts, ISLANDS, ONE)
+    island.residual[i] = worst / speed if speed > 0.0 else 0.0
+
+
+@compiled
+def sweep_all(model, state, work, strips):
+    """Sweep over all strips as often as asked; return the residual."""
     for _ in range(model.crowd_sweeps):
         share_strips(model, state, work, codes.SWEEP, strips)
-    share_strips(model, state, work, codes.JUDGE, strips)
-    share_range(model, state, work, codes.END, model.bodies, h)
-    increase(state.counts, ISLANDS, ONE)
     increase(state.counts, SWEEPS, model.crowd_sweeps)
-    island.residual[i] = greatest(shared.worst, strips) / speed if speed > 0.0 else 0.0
+    share_strips(model, state, work, codes.JUDGE, strips)
+    return greatest(work.shared.worst, strips)
+
+
+@compiled
+def limit_crowd(model, state, work, strips, h):
+    """Take back what bounces in a crowd gain; return the residual of the compression.
+
+    As in :func:`~polycorner.motion.engine.island.limit_island`: impulses are mixed with those of
+    sweeps in which contacts are plastic, such that contacts and friction do no work.
+    """
+    whole = gain_of_crowd(model, state, work, strips)
+    if not whole > 0.0:
+        return 0.0
+    share_out(model, state, work, codes.COMPRESS, strips)
+    share_range(model, state, work, codes.BEGIN, model.bodies, h)
+    worst = sweep_all(model, state, work, strips)
+    share_out(model, state, work, codes.KEEP, strips)
+    lost, s = gain_of_crowd(model, state, work, strips), 1.0
+    if whole > max(0.0, lost):
+        half = mix_crowd(model, state, work, strips, h, 0.5)
+        s = share_without_gain(lost, half, whole)
+    mix_crowd(model, state, work, strips, h, s)
+    return worst
+
+
+@compiled
+def gain_of_crowd(model, state, work, strips):
+    """Return the work of the contacts of a crowd, which were judged."""
+    share_out(model, state, work, codes.GAIN, strips)
+    total = 0.0
+    for t in range(strips):
+        total += work.shared.gained[t]
+    return total
+
+
+@compiled
+def mix_crowd(model, state, work, strips, h, share):
+    """Set impulses between those of the compression and those of the whole; return their work."""
+    work.shared.times[codes.SHARE] = share
+    share_out(model, state, work, codes.MIX, strips)
+    share_range(model, state, work, codes.BEGIN, model.bodies, h)
+    share_strips(model, state, work, codes.PRESS, strips)
+    share_strips(model, state, work, codes.JUDGE, strips)
+    return gain_of_crowd(model, state, work, strips)
 
 
 @compiled
