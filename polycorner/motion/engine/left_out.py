@@ -6,17 +6,20 @@ These are islands
 - in which an impact that is not slow acts where the bodies are not;
 - whose bodies cross the boundary of a gap on their way, in and perhaps out again.
 
-Islands of more than ``LARGE`` blocks are left out only if they are not solved: in a dense heap
-there is always an impact, and the parts of a step, each solved for the whole heap, would cost more
-than shorter steps for all.  Crowds, whose steps need not be solved, are not left out.
+Islands of more than ``LARGE`` blocks are left out only if they are not solved, or if a body may
+pass through something: in a dense heap there is always an impact, and the parts of a step, each
+solved for the whole heap, would cost more than shorter steps for all.  Crowds need not be solved:
+they are left out only where a body may pass through something, and their parts are swept.
 """
+
+import numpy as np
 
 from polycorner.motion.engine.arrays import CONTACTS, LIMITS, OWN_LIMIT
 from polycorner.motion.engine.bounds import contact_of, is_slow
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_gaps
 from polycorner.motion.engine.families import family_of
-from polycorner.motion.engine.jit import NONE, compiled
+from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.limit_blocks import mark_jumps
 from polycorner.motion.engine.neighbours import bodies_of, speed_of, travel
 from polycorner.motion.engine.partition import is_large, island_of, root_of
@@ -38,6 +41,7 @@ from polycorner.motion.engine.paths import (
 )
 from polycorner.motion.engine.ties import form_of
 
+SWEPT = 4  # what is left out is a crowd
 CROWD = 2  # bodies beyond which those that are not fast need not be, either
 
 
@@ -84,6 +88,8 @@ def leave_out(model, state, work, blocks, h):
         # A neighbour has marked it; only what is not solved leaves a large island out.
         if is_large(island, i) and left[i] == 1:
             left[i] = 0
+        if left[i] and is_crowd(model, island.start[i], island.start[i + 1]):
+            left[i] = SWEPT
         found = found or left[i]
     if not found:
         return False
@@ -105,11 +111,13 @@ def leave_out(model, state, work, blocks, h):
         body.waits[i] = 0
     for i in range(N):
         if left[island.parent[i]] and body.awake[i]:
-            body.waits[root_of(joined, i)] = 1
+            r = root_of(joined, i)
+            body.waits[r] = max(body.waits[r], left[island.parent[i]])
     for i in range(N):
         r = root_of(joined, i)
         if body.waits[r] and state.alive[i]:
-            state.cluster[i], state.elapsed[i] = r, 0.0
+            state.cluster[i] = r + (N if body.waits[r] == SWEPT else ZERO)
+            state.elapsed[i] = 0.0
     for i in range(N):
         body.waits[i] = 0
         if state.cluster[i] >= 0:
@@ -228,27 +236,16 @@ def body_turns_into(model, state, work, i, deep, h):
 
 
 @compiled
-def pair_misses(model, state, mid, velocity, path, scratch, i, j, large, h):
-    """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`.
-
-    In a ``large`` island they may, unless they pass through each other.
-    """
+def pair_misses(model, state, mid, velocity, path, scratch, i, j, h):
+    """Return whether two bodies cross the boundary of an open gap; see :func:`body_misses`."""
     gap, rate, zero, out = scratch.way_gap, scratch.way_rate, model.zero_gap, scratch.image
     watched = state.watched[i] and state.watched[j]
-    deep, lower = 2.0 * model.bending * model.gap_unit, 0.0
-    if large:
-        deep = lower = model.gap_unit
+    deep = 2.0 * model.bending * model.gap_unit
     turn, before = turning(model, velocity.new, i, j, h), turning(model, state.v, i, j, h)
-    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, 0.0, NEXT)
-    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, h, FULL)
-    if not watched:
-        gaps_at(model, path, scratch, state.q, state.v, i, j, 0.0, START)
-        gaps_at(model, path, scratch, state.q, state.v, i, j, 0.5 * h, MIDDLE)
+    look_on(model, state, mid, velocity, path, scratch, i, j, watched, h)
     for g in range(model.pair_gaps[family_of(model, i, j)]):
         f0, rate0, f1, rate1 = gap[NEXT, g], rate[NEXT, g], gap[FULL, g], rate[FULL, g]
-        misses = f0 > -zero and may_vanish(
-            open_gap(model, f0) + lower, rate0, f1 + lower, rate1, h, deep - lower
-        )
+        misses = f0 > -zero and may_vanish(open_gap(model, f0), rate0, f1, rate1, h, deep)
         if f0 > -zero and not misses and may_dip(f0, rate0, turn, h, deep):
             known, _ = first_dip(
                 model, path, scratch, mid.q, velocity.new, i, j, g, h, turn, deep, out
@@ -256,7 +253,7 @@ def pair_misses(model, state, mid, velocity, path, scratch, i, j, large, h):
             misses = known != CLEAR
         if not watched and not misses:
             f0, rate0, f1, rate1 = gap[START, g], rate[START, g], gap[MIDDLE, g], rate[MIDDLE, g]
-            misses = f0 > 0.0 and may_vanish(f0 + lower, rate0, f1 + lower, rate1, 0.5 * h, zero)
+            misses = f0 > 0.0 and may_vanish(f0, rate0, f1, rate1, 0.5 * h, zero)
             if f0 > 0.0 and not misses and may_dip(f0, rate0, before, 0.5 * h, deep):
                 known, _ = first_dip(
                     model, path, scratch, state.q, state.v, i, j, g, 0.5 * h, before, deep, out
@@ -270,17 +267,110 @@ def pair_misses(model, state, mid, velocity, path, scratch, i, j, large, h):
 
 
 @compiled
+def look_on(model, state, mid, velocity, path, scratch, i, j, watched, h):
+    """Evaluate gaps on the way to the next midpoint, and on that to this one if not ``watched``."""
+    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, 0.0, NEXT)
+    gaps_at(model, path, scratch, mid.q, velocity.new, i, j, h, FULL)
+    if not watched:
+        gaps_at(model, path, scratch, state.q, state.v, i, j, 0.0, START)
+        gaps_at(model, path, scratch, state.q, state.v, i, j, 0.5 * h, MIDDLE)
+
+
+@compiled
+def passes(model, state, work, i, j, h):
+    """Return whether a body of a large island may pass through another, or its surroundings.
+
+    It does where a gap, open or not, gets deeper than half the thickness of the thinnest body.
+    ``j < 0`` stands for the surroundings.
+    """
+    mid, velocity, path, scratch = work.mid, work.velocity, work.path, work.scratch
+    watched = state.watched[i] and (j < 0 or state.watched[j])
+    new, old, half = velocity.new, state.v, 0.5 * h
+    turn, before = turning(model, new, i, j, h), turning(model, old, i, j, h)
+    look_on(model, state, mid, velocity, path, scratch, i, j, watched, h)
+    count = model.first_equation[i] - model.first_gap[i]
+    if j >= 0:
+        count = model.pair_gaps[family_of(model, i, j)]
+    for g in range(count):
+        if gets_deep(model, path, scratch, mid.q, new, i, j, g, NEXT, FULL, h, turn):
+            return True
+        if not watched and gets_deep(
+            model, path, scratch, state.q, old, i, j, g, START, MIDDLE, half, before
+        ):
+            return True
+    return False
+
+
+@compiled
+def gets_deep(model, path, scratch, base, v, i, j, g, first, last, duration, turn):
+    """Return whether a gap gets deep on a segment, between two rows of what was evaluated."""
+    gap, rate, deep = scratch.way_gap, scratch.way_rate, model.gap_unit
+    f0, rate0, f1, rate1 = gap[first, g], rate[first, g], gap[last, g], rate[last, g]
+    # One that is deep already can only be told of.
+    if not f0 > -deep:
+        return False
+    if may_vanish(f0 + deep, rate0, f1 + deep, rate1, duration, 0.0):
+        return True
+    # The search reports what is half as deep, which must not be where it begins.
+    if not (f0 > -0.5 * deep and may_dip(f0, rate0, turn, duration, deep)):
+        return False
+    known, _ = first_dip(
+        model, path, scratch, base, v, i, j, g, duration, turn, deep, scratch.image
+    )
+    return known != CLEAR
+
+
+@compiled
+def far_enough(model, state, work, s, way, h):
+    """Return whether two neighbours are too far apart to meet by so much scaled travel."""
+    i, j = work.neighbours.pairs[s, 0], work.neighbours.pairs[s, 1]
+    before = 0.5 * h * (speed_of(model, state.v, i) + speed_of(model, state.v, j))
+    most = 2.0 * max(way, before) * max(1.0, model.gap_unit)
+    return work.neighbours.least_gap[s] > most or stay_apart(
+        model, state, work.mid, work.velocity, i, j, h
+    )
+
+
+@compiled
+def find_passing(model, state, work, h):
+    """Return two bodies, of those in motion, that may pass through each other, or -1 for both.
+
+    The second is -1 where it is the surroundings.
+    """
+    body, neighbours = work.body, work.neighbours
+    # What moves by less than half the thickness of the thinnest body cannot pass through any.
+    if 2.0 * travel(model, body, h) <= 1.0:
+        return NONE, NONE
+    for i in range(model.bodies):
+        fast = state.alive[i] and body.awake[i] and h * body.speed[i] > 1.0
+        if fast and passes(model, state, work, i, NONE, h):
+            return np.int64(i), NONE
+    for s in range(neighbours.status[0] if model.families > 0 else ZERO):
+        i, j = neighbours.pairs[s, 0], neighbours.pairs[s, 1]
+        if not (state.alive[i] and state.alive[j] and (body.awake[i] or body.awake[j])):
+            continue
+        way = h * (body.speed[i] + body.speed[j])
+        near = way > 1.0 and not far_enough(model, state, work, s, way, h)
+        if near and passes(model, state, work, i, j, h):
+            return i, j
+    return NONE, NONE
+
+
+@compiled
 def mark_misses(model, state, work, left, h):
     """Mark the islands with bodies that cross the boundary of a gap on their way."""
     mid, velocity, body, path, island = work.mid, work.velocity, work.body, work.path, work.island
     neighbours, scratch = work.neighbours, work.scratch
     if model.first_gap[model.bodies] > 0:
         for i in range(model.bodies):
-            if not (state.alive[i] and body.awake[i]) or is_large(island, island.parent[i]):
+            if not (state.alive[i] and body.awake[i]):
                 continue
-            if body_misses(model, state, work, i, h):
+            if is_large(island, island.parent[i]):
+                if h * body.speed[i] > 1.0 and passes(model, state, work, i, NONE, h):
+                    left[island.parent[i]] |= 2
+            elif body_misses(model, state, work, i, h):
                 left[island.parent[i]] |= 1
-    # What moves by less than the thickness of the thinnest body cannot pass through any.
+    # What moves by less than half the thickness of the thinnest body cannot pass through any.
     slow = min(model.near_many * model.gap_unit, 1.0)
     if model.families == 0 or 2.0 * travel(model, body, h) <= slow:
         return
@@ -290,14 +380,13 @@ def mark_misses(model, state, work, left, h):
             continue
         way = h * (body.speed[i] + body.speed[j])
         large = is_large(island, island.parent[i]) and is_large(island, island.parent[j])
-        if way <= (1.0 if large else slow):
+        if way <= (1.0 if large else slow) or far_enough(model, state, work, s, way, h):
             continue
-        way = max(way, 0.5 * h * (speed_of(model, state.v, i) + speed_of(model, state.v, j)))
-        if neighbours.least_gap[s] > 2.0 * way * max(1.0, model.gap_unit):
-            continue
-        if not stay_apart(model, state, mid, velocity, i, j, h) and pair_misses(
-            model, state, mid, velocity, path, scratch, i, j, large, h
-        ):
+        if large:
+            misses = passes(model, state, work, i, j, h)
+        else:
+            misses = pair_misses(model, state, mid, velocity, path, scratch, i, j, h)
+        if misses:
             left[island.parent[i]] |= 2 if large else 1
             left[island.parent[j]] |= 2 if large else 1
 

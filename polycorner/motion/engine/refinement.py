@@ -4,7 +4,8 @@ After a step was solved, some islands are left out of it
 (:mod:`~polycorner.motion.engine.left_out`).  They then do the same step in parts (:func:`refine`),
 in which a contact acts only if it is closed.  A part ends where another contact closes, and an
 impact is a part of no length.  A part that is not solved to the tolerance, or in which a contact
-sinks in, is halved.  The parts of an island do not depend on other bodies.
+sinks in, is halved.  The parts of an island do not depend on other bodies.  Those of a crowd are
+swept as its whole steps are, and halved while a body may pass through another.
 """
 
 import numpy as np
@@ -28,7 +29,7 @@ from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
-from polycorner.motion.engine.left_out import leave_out, slow_travel
+from polycorner.motion.engine.left_out import find_passing, leave_out, slow_travel
 from polycorner.motion.engine.limit_blocks import acceptable_to_limits
 from polycorner.motion.engine.paths import acceptable_length, acceptable_to_ties
 from polycorner.motion.engine.sleep import stays_asleep, wake
@@ -54,9 +55,18 @@ def worst_island(model, island):
 
 @compiled
 def record_failure(model, work, log, root, time, count):
-    """Record where an island was not solved; return the number of events."""
+    """Record where an island was not solved; return the number of events.
+
+    Of a crowd this is known: it is recorded where bodies are sunk into each other.
+    """
     velocity, island, pair = work.velocity, work.island, work.pair
     block, search, scratch = work.block, work.search, work.scratch
+    if is_crowd(model, island.start[root], island.start[root + 1]):
+        b = island.sunk[root]
+        if b < 0:
+            return count
+        i, j, g = place_of(model, pair, block, b)
+        return record(log, count, FAILED, i, j, g, time, block.impulse[b, 0])
     worst, place = -1.0, NONE
     for s in range(island.start[root], island.start[root + 1]):
         far = residual(model, velocity, block, search, scratch, s, s + 1, 0.0)
@@ -106,12 +116,16 @@ def solve_part(model, state, work, h, time, index):
 
 
 @compiled
-def refine(model, state, work, log, root, index, count):
+def refine(model, state, work, log, cluster, index, count):
     """Do what is left of a step for the bodies of a cluster, in parts; return why it stopped."""
     manner = work.manner
     H, begin = model.step, index * model.step
-    gather(model, state, work, root, begin + 0.5 * H, index)
-    next_length, exact, parts, tried, spent = H, True, 0, 0, state.counts[SWEEPS]
+    root, swept = cluster % model.bodies, cluster >= model.bodies
+    gather(model, state, work, cluster, begin + 0.5 * H, index)
+    next_length, exact, parts, tried, spent = H, not swept, 0, 0, state.counts[SWEEPS]
+    if swept:  # in a whole one something passes
+        next_length = 0.5 * H
+    first, second = NONE, NONE
     while state.elapsed[root] < H:
         if count > model.event_room:
             return EVENTS_FULL, count
@@ -130,6 +144,11 @@ def refine(model, state, work, log, root, index, count):
                 return why, count
             where, worst = worst_island(model, work.island)
             tries += 1
+            if swept:
+                first, second = find_passing(model, state, work, h)
+                if first >= 0 and h > model.shortest_part * H:
+                    h, halved = 0.5 * h, True
+                    continue
             if not exact or tries == MOST_TRIES:
                 break
             if worst > model.tolerance and h > SHORTEST_SOLVED * H:
@@ -149,6 +168,8 @@ def refine(model, state, work, log, root, index, count):
             state.counts[UNSOLVED] += 1
             count = record_failure(model, work, log, where, time + 0.5 * h, count)
             exact = False
+        if first >= 0:
+            count = record(log, count, FAILED, first, second, NONE, time + h, 0.0)
         count = commit(model, state, work, log, blocks, h, time, index, True, count)
         parts, tried = parts + 1, tried + tries
         # Chattering impacts, as of a ball that comes to rest in a wedge, would go on for ever: what
@@ -168,18 +189,13 @@ def refine(model, state, work, log, root, index, count):
 
 @compiled
 def count_residuals(model, state, work, log, time, count):
-    """Note the residuals of the islands of a whole step, and record which are not solved.
-
-    Crowds, of which this is known, are counted only.
-    """
+    """Note the residuals of the islands of a whole step, and record which are not solved."""
     island = work.island
     for i in range(model.bodies):
         if island.start[i + 1] > island.start[i] and not work.body.waits[i]:
             state.sums[RESIDUAL] = max(state.sums[RESIDUAL], island.residual[i])
             if island.residual[i] > model.tolerance:
                 state.counts[UNSOLVED] += 1
-                if is_crowd(model, island.start[i], island.start[i + 1]):
-                    continue
                 count = record_failure(model, work, log, np.int64(i), time, count)
     return count
 
@@ -230,12 +246,13 @@ def step(model, state, work, log, count):
     if left:
         manner.remedy[0] = LAST
         for i in range(model.bodies):
-            if state.cluster[i] == i:
-                why, count = refine(model, state, work, log, i, index, count)
+            cluster = state.cluster[i]
+            if cluster >= 0 and cluster % model.bodies == i:
+                why, count = refine(model, state, work, log, cluster, index, count)
                 if why != DONE:
                     return why, count
                 for j in range(model.bodies):
-                    if state.cluster[j] == i:
+                    if state.cluster[j] == cluster:
                         state.cluster[j] = NONE
     state.counts[STEPS] = index + 1
     return DONE, count
