@@ -183,7 +183,7 @@ def refine(model, state, work, log, cluster, index, count):
         state.elapsed[root] = H if h >= rest else state.elapsed[root] + h
         # A part halved for its own sake grows again; one that ends at an impact says nothing of the
         # next.
-        next_length = 2.0 * h if halved else H
+        next_length = 2.0 * h if halved or swept else H
     return DONE, count
 
 

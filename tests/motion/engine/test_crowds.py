@@ -81,7 +81,8 @@ def test_threads_share_no_array_in_which_something_is_in_the_making():
     serial |= {"crowd.strips", "crowd.strip_cursor", "crowd.strip_start"}
     serial |= {f"tie.{name}" for name in TieWork._fields}
     serial |= {f"limit.{name}" for name in LimitWork._fields if name != "landing"}
-    told = {f"shared.{name}" for name in ("finite", "signals", "told", "times", "worst")}
+    names = ("finite", "signals", "told", "times", "worst", "gained", "sunk")
+    told = {f"shared.{name}" for name in names}
     assert whole == serial | told | {"manner.located", "manner.remedy"}
 
 

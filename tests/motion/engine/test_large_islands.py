@@ -1,0 +1,191 @@
+"""What holds for islands of any size: impacts gain no energy, and nothing passes through.
+
+Oracles are sums over bodies, straight flights in samples, and distances from their definition.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from polycorner.bodies import Arrangement, HalfSpace, Mass, capsule, disc
+from polycorner.motion import EventKind, Solver
+from polycorner.motion.engine.crowds import CROWD
+from polycorner.motion.engine.partition import LARGE
+from polycorner.motion.simulation import simulate, start
+from tests.support.rods import distance
+
+MASS, INERTIA = 2.0, 0.3
+HALF, RADIUS, THIN = 0.5, 0.1, 0.02
+
+
+def box(width, height):
+    walls = {"floor": ([0, 1], [0, 0]), "left": ([1, 0], [0, 0])}
+    walls |= {"right": ([-1, 0], [width, 0]), "top": ([0, -1], [0, height])}
+    return {name: HalfSpace(*wall) for name, wall in walls.items()}
+
+
+@cache
+def gas(law, columns, rows, restitution, friction):
+    """Rods in a box without gravity, nearly touching, that are thrown."""
+    rod, size = capsule([-HALF, 0], [HALF, 0], RADIUS), (1.3 * columns, 0.3 * rows)
+    arrangement = Arrangement({"A": rod}, box(*np.add(size, 1.0)), orientations="all")
+    given = {"friction": friction, "restitution": restitution, "count": columns * rows}
+    return arrangement.system(masses={"A": Mass(MASS, [0, 0], INERTIA)}, impact=law, **given)
+
+
+def thrown(law, columns, rows, restitution, friction, seed, solver):
+    """Return kinetic energies after each step, from the definition, and the largest islands."""
+    system, rng = gas(law, columns, rows, restitution, friction), np.random.default_rng(seed)
+    x, y = np.meshgrid(0.7 + 1.25 * np.arange(columns), 0.3 + 0.3 * np.arange(rows))
+    q = np.column_stack([x.ravel(), y.ravel(), rng.uniform(-0.07, 0.07, x.size)])
+    engine = start(system, system.state(q, rng.normal(size=q.shape)), 0.01, solver=solver)
+    energies, islands = [], []
+    for _ in range(60):
+        v = engine.motion.v
+        energies.append((MASS * v[:, :2] ** 2).sum() / 2 + (INERTIA * v[:, 2] ** 2).sum() / 2)
+        engine.advance(1)
+        islands.append(np.diff(engine.work.island.start).max())
+    return np.array(energies), np.array(islands), engine
+
+
+@pytest.mark.parametrize("law", ["poisson", "newton", "stronge"])
+@pytest.mark.parametrize(("restitution", "friction"), [(1.0, 1.0), (0.6, 0.4)])
+def test_a_gas_of_rods_that_is_solved_gains_no_energy(law, restitution, friction):
+    energies, islands, engine = thrown(law, 6, 12, restitution, friction, 3, None)
+    assert (islands > LARGE).sum() > 10
+    assert engine.effort.unconverged == 0
+    assert np.diff(energies).max() <= engine.model.tolerance * energies[0]
+
+
+@pytest.mark.parametrize("law", ["poisson", "newton", "stronge"])
+@pytest.mark.parametrize("sweeps", [3, 10])
+def test_a_gas_of_rods_that_is_swept_gains_no_energy(law, sweeps):
+    """However little of a step a few sweeps solve."""
+    for friction in (0.3, 1.0):
+        solver = Solver.crowd(sweeps)
+        energies, islands, _ = thrown(law, 10, 15, 1.0, friction, 3, solver)
+        assert (islands > CROWD).sum() > 10
+        assert np.diff(energies).max() <= 1e-12 * energies[0]
+
+
+def test_newtons_law_as_published_gains_energy_where_it_is_swept():
+    energies, _, _ = thrown("newton unlimited", 10, 15, 1.0, 0.3, 3, Solver.crowd(3))
+    assert np.diff(energies).max() > 1e-2 * energies[0]
+
+
+def test_what_is_taken_back_leaves_impulses_in_their_cones_and_velocities_that_follow_from_them():
+    """Impulses push, friction is within its cone, and momentum is that of the impulses."""
+    friction, taken = 0.3, 0
+    system, rng = gas("poisson", 10, 15, 1.0, friction), np.random.default_rng(3)
+    x, y = np.meshgrid(0.7 + 1.25 * np.arange(10), 0.3 + 0.3 * np.arange(15))
+    q = np.column_stack([x.ravel(), y.ravel(), rng.uniform(-0.07, 0.07, x.size)])
+    state = system.state(q, rng.normal(size=q.shape))
+    engine = start(system, state, 0.01, solver=Solver.crowd(3))
+    for _ in range(30):
+        before, sweeps = engine.motion.v.copy(), engine.effort.sweeps
+        engine.advance(1)
+        block, v = engine.work.block, before.copy()
+        starts = engine.work.island.start
+        for i in np.flatnonzero(np.diff(starts) > CROWD):
+            taken += engine.effort.sweeps > sweeps + 3
+            blocks = block.order[starts[i] : starts[i + 1]]
+            K, p = engine.work.velocity.new.shape[1], block.impulse
+            for b in blocks:
+                if block.rows[b]:
+                    assert abs(p[b, 0]) <= friction * p[block.pressing[b], 0] * (1 + 1e-9)
+                else:
+                    assert p[b, 0] >= 0
+                for side, body in enumerate(block.bodies[b]):
+                    if body >= 0:
+                        row = block.jacobian[b, 0, side * K : side * K + 3]
+                        v[body] += p[b, 0] * row / [MASS, MASS, INERTIA]
+            moved = np.unique(block.bodies[blocks])
+            moved = moved[moved >= 0]
+            found = engine.motion.v[moved]
+            np.testing.assert_allclose(found, v[moved], atol=1e-11 * abs(before).max())
+    assert taken
+
+
+@cache
+def thin_rods(side):
+    rod = Arrangement({"A": capsule([-HALF, 0], [HALF, 0], THIN)}, orientations="all")
+    return rod.system(friction=0.3, restitution=0.5, count=side**2 + 1)
+
+
+def shots(seed, number, side, dt):
+    """A crowd of rods at rest, one that flies at it and turns, and when it meets one first."""
+    rng = np.random.default_rng(seed)
+    while number:
+        at = np.arange(side) - side / 2
+        x, y = np.meshgrid(1.1 * at, 0.15 * at)
+        q = np.column_stack([x.ravel(), y.ravel(), rng.uniform(-0.1, 0.1, side**2)])
+        shot = np.array([0.05, 0.15 * at[0] - 1.2, rng.uniform(-3, 3)])
+        v = np.array([rng.uniform(-9, 9), rng.uniform(40, 90), rng.uniform(-150, 150)])
+        t = np.linspace(0, 0.05, 10_001)
+        # All others are at rest, so that up to then it flies straight on.
+        gap = distance((shot + t[:, None] * v)[:, None], q, HALF).min(axis=1) - 2 * THIN
+        met = np.flatnonzero(gap < 0)
+        if gap[0] < 0.05 or not len(met) or t[met[0]] < dt:
+            continue
+        number -= 1
+        yield np.vstack([q, shot]), np.vstack([0 * q, v]), t[met[0]]
+
+
+def flown(system, q, v, dt, steps, **given):
+    """Return the states after each step, the events, and the largest island of all steps."""
+    engine = start(system, system.state(q, v), dt, solver=Solver(tolerance=1e-4, **given))
+    states, events, largest = [q], [], 0
+    for _ in range(steps):
+        events += list(engine.advance(1))
+        states.append(engine.motion.q.copy())
+        largest = max(largest, np.diff(engine.work.island.start).max())
+    return np.array(states), events, largest
+
+
+def crossings(states):
+    """Return how many recorded states there are with rods that cross each other."""
+    one, two = np.triu_indices(states.shape[1], 1)
+    near = np.linalg.norm(states[:, one, :2] - states[:, two, :2], axis=2).min(axis=0) < 1.1
+    one, two = one[near], two[near]
+    return int((distance(states[:, one], states[:, two], HALF) == 0).any(axis=1).sum())
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.01])
+def test_a_rod_that_is_shot_at_a_crowd_meets_it_when_its_straight_flight_does(dt):
+    """And no two rods cross each other, at any instant."""
+    side, passed = 14, 0
+    system = thin_rods(side)
+    for q, v, met in shots(1, 4, side, dt):
+        steps = int(met / dt) + 2
+        states, events, largest = flown(system, q, v, dt, steps, crowd_sweeps=10)
+        plain, _, _ = flown(system, q, v, dt, steps, crowd_sweeps=10, refine=False)
+        assert largest > CROWD
+        until = int(met / dt)
+        flight = q[-1] + np.arange(until)[:, None] * dt * v[-1]
+        np.testing.assert_allclose(states[:until, -1], flight, rtol=1e-9)
+        first = min(e.time for e in events if len(q) - 1 in e.bodies)
+        assert first == pytest.approx(met, abs=2e-3)
+        assert not crossings(states)
+        passed += crossings(plain)
+    assert passed
+
+
+def test_a_fast_rod_of_a_large_island_does_not_pass_through_a_fixed_one():
+    """Many bodies that touch, one of which is thrown at a thin bar."""
+
+
+def test_bodies_of_a_crowd_that_are_sunk_into_each_other_are_told():
+    """Discs of a lattice, of which two are pushed together to a third of their distance."""
+    arrangement = Arrangement({"D": disc(1.0)}, box(100.0, 900.0), orientations="all")
+    system = arrangement.system(count=800)
+    rows, columns = np.divmod(np.arange(800), 4)
+    q = np.column_stack([10 + 2.0 * columns, 10 + 2.0 * rows, 0 * rows])
+    engine = start(system, system.state(q), 5e-3, solver=Solver(tolerance=1e-4, crowd_sweeps=3))
+    engine.motion.v[:, 0] = -0.2 * (columns - 1.5)
+    engine.advance(1)
+    assert (np.diff(engine.work.island.start) > CROWD).any()
+    engine.motion.q[401, 0] = engine.motion.q[400, 0] + 0.7
+    events = list(engine.advance(1))
+    failed = [event for event in events if event.kind is EventKind.FAILED]
+    assert {400, 401} in [set(event.bodies) for event in failed]
