@@ -6,6 +6,7 @@ import pytest
 from polycorner import simulate
 from polycorner.bodies import Arrangement, HalfSpace, capsule, polygon
 from polycorner.motion import EventKind
+from tests.support.rods import distance
 
 RADIUS, HALF = 0.01, 1.0
 ROD = capsule([-HALF, 0], [HALF, 0], RADIUS)
@@ -28,30 +29,6 @@ def start(system, q, v=None):
     )
 
 
-def of_point(p, a, b):
-    """Distance of points from segments."""
-    u = b - a
-    t = np.clip(((p - a) * u).sum(-1) / (u * u).sum(-1), 0, 1)
-    return np.linalg.norm(p - a - t[..., None] * u, axis=-1)
-
-
-def beside(a, b, p):
-    u, v = b - a, p - a
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-
-
-def distance(one, other):
-    """Distance of the axes of two rods in the plane, 0 where they cross."""
-    ends = []
-    for q in (one, other):
-        along = HALF * np.stack([np.cos(q[..., 2]), np.sin(q[..., 2])], axis=-1)
-        ends += [q[..., :2] - along, q[..., :2] + along]
-    a, b, c, d = ends
-    least = np.min([of_point(a, c, d), of_point(b, c, d), of_point(c, a, b), of_point(d, a, b)], 0)
-    crossed = (beside(a, b, c) * beside(a, b, d) < 0) & (beside(c, d, a) * beside(c, d, b) < 0)
-    return np.where(crossed, 0.0, least)
-
-
 def flights(seed, number, duration):
     """Fast rods that fly towards each other and turn, and when they meet first, or None."""
     rng = np.random.default_rng(seed)
@@ -60,7 +37,7 @@ def flights(seed, number, duration):
         v = np.column_stack([-q[:, :2] * rng.uniform(1, 6), rng.uniform(-40, 40, 2)])
         v[:, :2] += rng.normal(scale=2, size=(2, 2))
         t = np.linspace(0, duration, INSTANTS)[:, None]
-        gap = distance(*(q[k] + t * v[k] for k in range(2))) - 2 * RADIUS
+        gap = distance(*(q[k] + t * v[k] for k in range(2)), HALF) - 2 * RADIUS
         met = np.flatnonzero(gap < 0)
         # What nearly touches meets or misses by what is between two samples.
         if gap[0] < 0.05 or (not len(met) and gap.min() < 2e-3):
@@ -168,7 +145,7 @@ def test_rods_that_cross_are_refused_as_contains_refuses_them(count):
     refused = 0
     for _ in range(40):
         q = rng.uniform(-1, 1, (2, 3)) * [1, 1, 3]
-        gap = distance(q[0], q[1]) - 2 * RADIUS
+        gap = distance(q[0], q[1], HALF) - 2 * RADIUS
         assert listed.contains(q.ravel()) == (gap >= 0)
         if gap < 0:
             refused += 1
