@@ -25,7 +25,7 @@ from polycorner.dumbbells.imperfections import (
     Wobble,
 )
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.motion import Disc, Interval, MechanicalSystem, State
+from polycorner.motion import Attraction, Disc, Interval, MechanicalSystem, State
 from polycorner.toolkit import (
     SHORTEST_STEP,
     Array,
@@ -79,6 +79,14 @@ class DumbbellDrum(MechanicalSystem):
         Whether the drum has a flat bottom at ``eta = 0``.
     top : float
         Where the drum ends, in mm: a dumbbell whose centre passes it has left; ``inf``: never.
+    cohesion : float
+        Force with which dumbbells attract each other where they touch, at each contact, over the
+        weight of a dumbbell; it falls to zero at the gap ``cohesion_range``
+        (:class:`~polycorner.motion.Attraction`).
+    adhesion : float
+        Force with which the wall attracts a dumbbell, half at each ball, over its weight.
+    cohesion_range : float
+        In mm.
     shaking, out_of_round, wobble, uneven_friction : optional
         :class:`Shaking`, :class:`OutOfRound`, :class:`Wobble` and :class:`UnevenFriction`, the
         imperfections of a real drum; none by default.
@@ -109,6 +117,9 @@ class DumbbellDrum(MechanicalSystem):
     ball_mass: float = 0.14
     floor: bool = False
     top: float = math.inf
+    cohesion: float = 0.0
+    adhesion: float = 0.0
+    cohesion_range: float = 0.05
     shaking: Shaking | None = None
     out_of_round: OutOfRound | None = None
     wobble: Wobble | None = None
@@ -124,6 +135,9 @@ class DumbbellDrum(MechanicalSystem):
         real("spin", self.spin, least=-most, most=most, unit="rad/s")
         real("restitution", self.restitution, least=0, most=1)
         real("ball_mass", self.ball_mass, above=0, unit="g")
+        real("cohesion", self.cohesion, least=0)
+        real("adhesion", self.adhesion, least=0)
+        real("cohesion_range", self.cohesion_range, above=0, most=self.rod_radius, unit="mm")
         real("top", self.top, above=0, infinite=True, unit="mm")
         flag("floor", self.floor)
         self.imperfections.check(self.tilt, self.centre_radius)
@@ -169,6 +183,7 @@ class DumbbellDrum(MechanicalSystem):
         m, g = self.ball_mass, GRAVITY
         weight, pull = m * g * math.cos(self.tilt), m * g * math.sin(self.tilt)
         numbers = [length, r, rho, m, self.spin * rho, weight, pull]
+        numbers += [self.adhesion * m * g] if self.adhesion else []
         slide, roll = self.sliding, self.rolling
         friction = (
             *(
@@ -185,7 +200,7 @@ class DumbbellDrum(MechanicalSystem):
         gaps = [Call(drum_formulas.floors(), (1, 2), np.array([length, r]), (0, 1), (0, 1))]
         units = np.array([rho, 1.0, length / 2, r])
         body = MovingBody(
-            perfect_motion(),
+            perfect_motion(bool(self.adhesion)),
             np.array(numbers),
             friction,
             gaps if self.floor else [],
@@ -213,6 +228,9 @@ class DumbbellDrum(MechanicalSystem):
             (PairLaw(2, Disc(self.rubbing[0]), Disc(self.rubbing[1])),),
             float(self.restitution),
             reach,
+            Attraction(self.cohesion * 2 * self.ball_mass * GRAVITY, self.cohesion_range)
+            if self.cohesion
+            else None,
         )
 
     @checked

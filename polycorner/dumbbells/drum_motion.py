@@ -9,7 +9,7 @@ out, is ``(S sin(phi_i) - W cos(phi_i)) (rho + delta_i) + P eta_i``, and it pres
 
     N_i = W cos(phi_i) - S sin(phi_i) + (delta_i' / rho) (W sin(phi_i) + S cos(phi_i))
 
-if that is positive, else with 0.  What differs from the energy of the perfect drum at rest is an
+if that is positive, else with 0; if it clings to the wall, with so much more.  What differs from the energy of the perfect drum at rest is an
 applied force, so that its work is booked.
 """
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 COORDINATES = ("phi", "eta", "theta", "psi")
 PARAMETERS = ("l", "r", "rho", "m", "surface", "weight", "pull")
+CLINGING = "clinging"  # parameter: by how much more each ball presses on the wall
 # Functions of the time: angle by which the drum has turned; S, and what W and P differ by.
 SIGNALS = ("turned", "side", "heavier", "steeper")
 SLIPS = ("slip1_r", "slip1_s", "slip2_r", "slip2_s", "spin")
@@ -51,21 +52,27 @@ class Shape(NamedTuple):
 
     harmonics: int  # of a wall that is out of round
     uneven: bool  # whether friction is uneven
+    clings: bool = False  # whether balls cling to the wall
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters of the equations of motion."""
+        clinging = [CLINGING] if self.clings else []
         wall = [f"{name}{j}" for j in range(self.harmonics) for name in ("harmonic", "a", "p")]
         modes = range(FIELD_MODES if self.uneven else 0)
         place = [f"{name}{j}" for j in modes for name in ("waves", "along", "start")]
         amplitude = ["unevenness"] if self.uneven else []
-        return (*PARAMETERS, *wall, *amplitude, *place, TIME, *SIGNALS)
+        return (*PARAMETERS, *clinging, *wall, *amplitude, *place, TIME, *SIGNALS)
 
 
-@lru_cache(maxsize=1)
-def perfect_motion() -> Formulation:
-    """Return the equations of motion of one dumbbell in a perfect drum."""
-    return Formulation(COORDINATES, PARAMETERS, _laws, 5, 2, source_key(*MODULES))
+@lru_cache(maxsize=2)
+def perfect_motion(clings: bool = False) -> Formulation:
+    """Return the equations of motion of one dumbbell in a perfect drum, to which it may cling."""
+    key = source_key(*MODULES)
+    if not clings:
+        return Formulation(COORDINATES, PARAMETERS, _laws, 5, 2, key)
+    known = (*PARAMETERS, CLINGING)
+    return Formulation(COORDINATES, known, _clinging_laws, 5, 2, repr((key, CLINGING)))
 
 
 @lru_cache(maxsize=16)
@@ -112,7 +119,8 @@ def imperfect_body(
     fixed = body.parameters.tolist()
     fixed += [] if wall is None else wall.numbers
     fixed += [] if uneven is None else uneven.numbers(2 * math.pi * rho)
-    shape = Shape(0 if wall is None else len(wall.amplitudes), uneven is not None)
+    clings = len(body.parameters) > len(PARAMETERS)
+    shape = Shape(0 if wall is None else len(wall.amplitudes), uneven is not None, clings)
     return replace(
         body,
         formulation=imperfect_motion(shape),
@@ -172,6 +180,11 @@ def _laws() -> Laws:
     )
 
 
+def _clinging_laws() -> Laws:
+    perfect, (more,) = _laws(), _symbols(CLINGING)
+    return replace(perfect, loads=tuple(load + more for load in perfect.loads))
+
+
 def _signals(shaken: bool, wobbling: bool) -> "tuple[Expressions, Expressions]":
     import sympy
 
@@ -208,6 +221,7 @@ def _imperfect_laws(shape: Shape) -> Laws:
         down = (weight + heavier) * cosine - side * sine
         energy += side * rho * sine - heavier * rho * cosine - wall * down + steeper * eta
         load = down + slope / rho * ((weight + heavier) * sine + side * cosine)
+        load += _symbols(CLINGING)[0] if shape.clings else 0
         loads.append(_positive(load) * _unevenness(shape, azimuth, eta))
     perfect = _laws()
     forces = {str(x): -sympy.diff(energy, x) for x in q[:3]}

@@ -216,6 +216,7 @@ def motion_attributes(path: Trajectory, names: Sequence[str]) -> dict[str, Any]:
         "noise_correlation_time": float(path.noise.correlation_time),
         "noise_kicks": json.dumps(dict(path.noise.kicks)),
         "noise_kick_time": float(path.noise.kick_time),
+        "noise_scatter": json.dumps(dict(path.noise.scatter)),
         "every": np.int64(path.every),
         "t_end": math.nan if path.t_end is None else path.t_end,
         "steps_per_second": path.steps_per_second,
@@ -300,6 +301,7 @@ def _noise(at: Mapping[Any, Any]) -> Noise:
         correlation_time=float(at["noise_correlation_time"]),
         kicks=json.loads(at["noise_kicks"]),
         kick_time=float(at.get("noise_kick_time", 0.0)),
+        scatter=json.loads(at.get("noise_scatter", "{}")),
         seed=int(at["seed"]),
     )
 

@@ -1,5 +1,6 @@
 from .accelerations import Accelerations, Consistency, accelerations
 from .assembly import Assembly
+from .bodies import Attraction
 from .checkpoints import Checkpoint
 from .contacts import (
     ContactFamily,
@@ -29,6 +30,7 @@ from .viability import SpeedZones
 __all__ = [
     "Accelerations",
     "Assembly",
+    "Attraction",
     "Checkpoint",
     "Consistency",
     "ContactFamily",

@@ -10,7 +10,7 @@ from polycorner.formulas.expressions import as_expression, as_expressions, writt
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction, with_numbers
 from polycorner.formulas.fusion import written_out
-from polycorner.motion.bodies import RUBBING, PairContacts, PairLaw
+from polycorner.motion.bodies import RUBBING, Attraction, PairContacts, PairLaw
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import TIME, dotted
 from polycorner.motion.friction import Interval
@@ -252,6 +252,8 @@ class ContactFamily(Checked):
         Coefficient ``0 <= e <= 1``, for the law of impact of the system; default 0, plastic.
     definitions : mapping from str to sympy.Expr, optional
         Intermediate quantities that the gaps use by name, each also in later ones.
+    attraction : Attraction, optional
+        At each gap; default none.  Its work is ``Trajectory.work["attraction"]``.
 
     Raises
     ------
@@ -265,6 +267,7 @@ class ContactFamily(Checked):
     friction: tuple[PairFriction, ...] = ()
     restitution: float = 0.0
     definitions: "Mapping[str, sympy.Expr]" = field(default_factory=dict)
+    attraction: Attraction | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", _several(self.position))
@@ -278,6 +281,8 @@ class ContactFamily(Checked):
             self, "restitution", real("restitution", self.restitution, least=0, most=1)
         )
         self._check_friction()
+        if self.attraction is not None:
+            instance("attraction", self.attraction, Attraction)
         super().__post_init__()
 
     def _check_friction(self) -> None:
@@ -297,6 +302,8 @@ class ContactFamily(Checked):
             {**{name: [*map(slip_text, rows)] for name, rows in law.slip.items()}, **law.told()}
             for law in self.friction
         ]
+        if self.attraction is not None:
+            told["attraction"] = [self.attraction.force, self.attraction.range]
         return told | {"restitution between bodies": self.restitution, "reach": self.reach}
 
     def compiled(self, manifold: Manifold, other: Manifold | None = None) -> PairContacts:
@@ -320,6 +327,7 @@ class ContactFamily(Checked):
             ),
             self.restitution,
             self.reach,
+            self.attraction,
         )
 
     def _slips(self, gap: str, variables: tuple[str, ...]) -> Family:

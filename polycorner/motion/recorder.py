@@ -45,7 +45,7 @@ FLAGS = (
 )
 TIES = {name for name in EngineState._fields if name.startswith("tie_")}
 LIMITS = {name for name in EngineState._fields if name.startswith("limit_")}
-NOW = {"rank", "body_of_rank", *TIES, *LIMITS}  # not in states saved before there were these
+NOW = {"rank", "body_of_rank", "stopped", *TIES, *LIMITS}  # not in states saved before there were these
 WORK = {"substrate": SUBSTRATE_WORK, "applied": APPLIED_WORK, "noise": NOISE_WORK}
 
 
@@ -67,6 +67,7 @@ def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
         "body_of_rank": (0, N - 1),
         "check_due": (0, last),
         "booked_to": (0, steps + 1),
+        "stopped": (0, steps),
         "pair_flags": (0, 2 ** max(1, sizes.H) - 1),
         "cluster": (-1, -1),  # no body is within a step
         "counts": (0, last),
@@ -269,6 +270,8 @@ class Recorder:
         dissipated = {cause: sums[:, DISSIPATED + i] for i, cause in enumerate(bodies.causes)}
         first = DISSIPATED + len(bodies.causes)
         work |= {name: sums[:, first + j] for j, name in enumerate(bodies.limit_names)}
+        if bodies.attracts:
+            work["attraction"] = sums[:, first + len(bodies.limit_names)]
         deepest = float(self.engine.motion.sums[PENETRATION])
         return self._trajectory(system, dissipated, work, deepest, **run)
 

@@ -290,6 +290,7 @@ def _parameters(
         "noise.correlation_time": float(noise.correlation_time),
         "noise.kicks": {name: float(size) for name, size in sorted(noise.kicks.items())},
         **({"noise.kick_time": float(noise.kick_time)} if noise.kick_time else {}),
+        **{f"noise.scatter {kind}": float(s) for kind, s in sorted(noise.scatter.items()) if s},
         "noise.seed": int(noise.seed),
         "solver.tolerance": float(solver.tolerance),
         "solver.sweeps": int(solver.sweeps),
@@ -349,6 +350,8 @@ def start(
         return cast("Engine", _start_drift(system, placed[0], state, dt, noise, solver, memory))
     every = [name for kind in bodies.kinds for name in kind.body.formulation.coordinates]
     names("kicks", noise.kicks, list(dict.fromkeys(every)))
+    known = {c.cause for kind in bodies.kinds for c in kind.body.friction if c.gap < 0}
+    names("scatter", noise.scatter, sorted(known))
     if noise.kicks and noise.kick_time:
         real("kick_time", noise.kick_time, least=dt / MOST_KICKS, unit="s")
     if isinstance(bodies, IdenticalBodies) and bodies.body.formulation.is_paced:
@@ -374,7 +377,7 @@ def _start_drift(
     """Return the engine of first-order motion."""
     from polycorner.motion.sweeping.driver import DriftEngine
 
-    if noise.chatter or noise.kicks:
+    if noise.chatter or noise.kicks or noise.scatter:
         expected = "a seed alone for a Drift, whose noise is its own"
         refuse("noise", expected, noise, TypeError)
     if solver.crowd_sweeps or solver.threads != 1 or not solver.refine:

@@ -119,6 +119,8 @@ class Model(NamedTuple):
     load_sources: Annotated[Any, whole("F L")]  # whether a known load presses
     friction_causes: Annotated[Any, whole("F")]  # cause under which its dissipation is booked
     friction_turns: Annotated[Any, whole("F")]  # whether its slip is asked for at the mean
+    scatter: Annotated[Any, real("F")]  # relative scatter of the threshold from stop to stop
+    scatter_least: Annotated[Any, real("F")]  # its least factor, that of the dynamic set
     set_kinds: Annotated[Any, whole("*")]
     set_sizes: Annotated[Any, real("* 4")]
     first_vertex: Annotated[Any, whole("*")]  # of each set, and one more
@@ -151,6 +153,10 @@ class Model(NamedTuple):
     pair_sets: Annotated[Any, whole("H 2")]  # static and dynamic set
     pair_causes: Annotated[Any, whole("H")]  # cause under which dissipation is booked
     pair_restitution: Annotated[Any, real("J")]
+    attracts: Annotated[Any, whole()]  # whether any two bodies attract each other
+    pair_attraction: Annotated[Any, real("J")]  # force where gaps are closed
+    pair_range: Annotated[Any, real("J")]  # gap at which it vanishes; 0: there is none
+    attraction_account: Annotated[Any, whole()]  # place of its work among the sums
     pair_reach: Annotated[Any, real("J")]  # distance of positions beyond which two cannot touch
     reach: Annotated[Any, real()]  # the largest of them
     position: Annotated[Any, whole("A 3")]  # coordinates that are a body's position, or -1
@@ -234,6 +240,7 @@ class EngineState(NamedTuple):
     q: Annotated[Any, real("N k")]  # coordinates
     v: Annotated[Any, real("N k")]  # velocities
     sticks: Annotated[Any, whole("F")]  # whether friction with the surroundings sticks; LEFT_OVER
+    stopped: Annotated[Any, whole("F")]  # step after which it came to stick; 0: the start
     friction: Annotated[Any, real("F 2")]  # its impulse
     normal: Annotated[Any, real("U")]  # normal impulses of contacts with the surroundings
     touches: Annotated[Any, whole("U")]  # whether they touch
@@ -287,6 +294,7 @@ class MidpointWork(NamedTuple):
     force: Annotated[Any, real("N k")]  # impulse of all forces in the step
     applied: Annotated[Any, real("N k")]  # that of the applied forces among them
     kick: Annotated[Any, real("N k")]  # random impulse
+    attraction: Annotated[Any, real("N k")]  # impulse of the attraction by other bodies
     inverse_mass: Annotated[Any, real("N k K")]
     slip_rows: Annotated[Any, real("R K")]  # Jacobian of the slip velocities
     slip_offset: Annotated[Any, real("R")]  # slip velocity at zero velocity
@@ -394,6 +402,7 @@ class PairWork(NamedTuple):
     gap: Annotated[Any, real("C")]
     before: Annotated[Any, whole("C")]  # index in the list of the last step, or -1
     impulse: Annotated[Any, real("C T+1")]  # initial impulses
+    attraction: Annotated[Any, real("C")]  # its magnitude in the step
     gradient: Annotated[Any, real("C 2*K")]
     sort_keys: Annotated[Any, whole("S")]
     ranked: Annotated[Any, whole("C")]  # contacts between bodies by key

@@ -11,6 +11,7 @@ from polycorner.motion.engine.arrays import (
     OWN_LIMIT,
     PAIR_GAP,
     PENETRATION,
+    STEPS,
     TIE_FRICTION,
     TIE_GAP,
 )
@@ -30,8 +31,13 @@ ACTED, CEASED = np.int64(8), np.int64(9)
 @compiled
 def takes_part(body, block, b):
     """Return whether a block acts on a body that is solved for."""
-    j = block.bodies[b, 1]
-    return body.awake[block.bodies[b, 0]] or (j >= 0 and body.awake[j])
+    return takes_part_of(body, block.bodies[b, 0], block.bodies[b, 1])
+
+
+@compiled
+def takes_part_of(body, i, j):
+    """Return whether one of two bodies, of which the second may be -1, is solved for."""
+    return body.awake[i] or (j >= 0 and body.awake[j])
 
 
 @compiled
@@ -106,7 +112,10 @@ def observe_block(model, state, work, b, h, time, sums):
     if not takes_part(body, block, b):
         return
     if kind == OWN_FRICTION:
+        held = state.sticks[g]
         state.sticks[g] = 1 if goes_on_sticking(model, body, block, b) else 0
+        if state.sticks[g] and not held:
+            state.stopped[g] = state.counts[STEPS] + 1
         if state.sticks[g] and model.friction_turns[g] and block.law[b] == AT_END:
             state.sticks[g] = LEFT_OVER
     elif kind == TIE_FRICTION:
@@ -276,6 +285,8 @@ def add_contacts(model, state, body, pair, block, event, begin, end, kept, share
         state.pair_flags[size, 0] = 0
         for a in range(k if model.may_rest else ZERO):
             p = state.pair_impulse[size, 0]
+            if model.attracts:
+                p -= pair.attraction[block.origin[b, 1]] * lasting
             state.pair_action[size, a] = block.jacobian[b, 0, a] * p
             state.pair_action[size, k + a] = block.jacobian[b, 0, K + a] * p
         family = family_of(model, block.bodies[b, 0], block.bodies[b, 1])

@@ -305,7 +305,8 @@ class Engine:
         untied: dict[str, Any] = {
             name: [] for name in EngineState._fields if name.startswith(("tie_", "limit_"))
         }
-        arrays = {"rank": order, "body_of_rank": order, **untied, **arrays}
+        stops = np.zeros(self.bodies.frictions, dtype=np.int64)  # of states saved before scatter
+        arrays = {"rank": order, "body_of_rank": order, "stopped": stops, **untied, **arrays}
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
         self.bodies.check_places(arrays["q"], arrays["v"], self.dt)

@@ -130,9 +130,18 @@ def evaluate_place(model, state, mid, scratch, i, h, time):
             if model.load_sources[f, j]:
                 load += values[at + j]
         mid.load[f] = max(0.0, h * load)
+        if model.scatter[f] > 0.0 and state.sticks[f]:
+            mid.load[f] *= drawn_threshold(model, i, f, state.stopped[f])
     begin_slips(model, state, mid, i)
     evaluate_slips(model, state, mid, scratch, i)
     evaluate_gaps(model, scratch, i, mid.q, 0.0, mid.gap, mid.gradient)
+
+
+@compiled
+def drawn_threshold(model, i, f, stop):
+    """Return the factor of the threshold of a friction contact, drawn when it stopped."""
+    drawn = gaussian(model.seed, -1 - stop, i, f - model.first_friction[i])
+    return max(model.scatter_least[f], np.exp(model.scatter[f] * (drawn - 0.5 * model.scatter[f])))
 
 
 @compiled
@@ -404,7 +413,9 @@ def start_body(model, state, work, i):
         value = state.v[i, c]
         if body.awake[i]:
             for a in range(k):
-                value += mid.inverse_mass[i, c, a] * (mid.force[i, a] + mid.kick[i, a])
+                value += mid.inverse_mass[i, c, a] * (
+                    mid.force[i, a] + mid.kick[i, a] + mid.attraction[i, a]
+                )
         velocity.old[i, c] = state.v[i, c]
         velocity.free[i, c] = value
         velocity.new[i, c] = value

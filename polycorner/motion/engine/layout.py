@@ -1,5 +1,6 @@
 """Bodies and their contacts as model constants of the compiled code."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -115,6 +116,8 @@ def model_of(
         ),
         **{name: getattr(options, name) for name in SHARES},
         **{name: getattr(options, name) * bodies.gap_unit for name in LENGTHS},
+        **_attractions(bodies, options),
+        **_scatter(bodies, noise),
         **_near(bodies, noise, options),
         "start": start,
         "step": step,
@@ -144,6 +147,32 @@ def _near(bodies: MovingBodies, noise: Noise, options: MotionOptions) -> dict[st
         many = max(near, options.crowd_travel * least / bodies.gap_unit)
         near = near if bodies.total <= MANY else many
     return {"near": near, "near_many": many}
+
+
+def _attractions(bodies: MovingBodies, options: MotionOptions) -> dict[str, Any]:
+    """Return the entries of attraction; contacts are looked for up to its range."""
+    families = [*bodies.families.values()]
+    ranges = [one.range for one in families]
+    return {
+        "attracts": bodies.attracts,
+        "pair_attraction": [one.attraction.force if one.attraction else 0.0 for one in families],
+        "pair_range": ranges,
+        "attraction_account": DISSIPATED + len(bodies.causes) + len(bodies.limit_names),
+        "detection": max(options.detection * bodies.gap_unit, *ranges, 0.0),
+    }
+
+
+def _scatter(bodies: MovingBodies, noise: Noise) -> dict[str, Any]:
+    """Return the entries of thresholds that scatter, of friction under known loads."""
+    every = [c for kind in bodies.kinds for _ in range(kind.count) for c in kind.body.friction]
+    widths = [noise.scatter.get(c.cause, 0.0) if c.gap < 0 else 0.0 for c in every]
+    return {
+        "scatter": [math.sqrt(math.log1p(width**2)) for width in widths],
+        "scatter_least": [
+            float(np.max(c.static.gauge(c.dynamic.tips))) if width > 0 else 0.0
+            for c, width in zip(every, widths, strict=True)
+        ],
+    }
 
 
 def _dependence(body: MovingBody) -> dict[str, bool]:
@@ -307,6 +336,7 @@ def _pairs(bodies: MovingBodies, parameters: list[float], sets: "_Sets") -> dict
             parameters += values
     laws = [law for one in families for law in one.laws]
     starts = [np.cumsum([0, *(law.rows for law in one.laws)])[:-1] for one in families]
+    reach = [one.reach + one.range / bodies.gap_unit for one in families]
     return {
         "families": len(families),
         "family": family,
@@ -325,8 +355,8 @@ def _pairs(bodies: MovingBodies, parameters: list[float], sets: "_Sets") -> dict
         "pair_sets": [[sets.add(law.static), sets.add(law.dynamic)] for law in laws],
         "pair_causes": [bodies.causes.index(law.cause) for law in laws],
         "pair_restitution": [one.restitution for one in families],
-        "pair_reach": [one.reach for one in families],
-        "reach": max((one.reach for one in families), default=0.0),
+        "pair_reach": reach,
+        "reach": max(reach, default=0.0),
     }
 
 

@@ -28,7 +28,7 @@ class Sizes(NamedTuple):
     H: int  # laws of friction of all families
     T: int  # rows of the slip velocities of a family, at most
     Y: int  # gaps of a body, of two, or of a tie, whichever are most
-    D: int  # causes of dissipation, then limits on velocities by name
+    D: int  # causes of dissipation, then limits on velocities by name, then attraction
     C: int  # contacts between bodies for which there is room
     P: int  # pairs of neighbours for which there is room
     B: int  # blocks
@@ -86,7 +86,7 @@ class Sizes(NamedTuple):
             H=sum(len(family.laws) for family in families),
             T=max((sum(law.rows for law in family.laws) for family in families), default=0),
             Y=max(most, gaps, ties.most_rows),
-            D=len(bodies.causes) + len(bodies.limit_names),
+            D=len(bodies.causes) + len(bodies.limit_names) + bodies.attracts,
             C=contacts,
             P=pairs,
             B=blocks,

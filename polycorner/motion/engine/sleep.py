@@ -174,7 +174,7 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
     for i in range(N):
         sleep.disturbed[i] = 0
         for c in range(k):
-            sleep.neighbour_impulse[i, c] = 0.0
+            sleep.neighbour_impulse[i, c] = mid.attraction[i, c]
     for s in range(state.counts[CONTACTS]):
         i, j = bodies_of(model, state, s)
         if body.awake[i] or body.awake[j]:

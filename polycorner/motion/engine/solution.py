@@ -12,6 +12,7 @@ from polycorner.motion.engine.arrays import (
     SWEEPS,
     UNPROJECTED,
 )
+from polycorner.motion.engine.attraction import book_attraction
 from polycorner.motion.engine.blocks import (
     assemble_body_blocks,
     assemble_contacts,
@@ -267,6 +268,8 @@ def observe(model, state, work, blocks, h, time):
     forget_blocks(work.pair, work.neighbours.status[2])
     book(model, state, work, codes.OBSERVE, blocks, h)
     book(model, state, work, codes.BOOK, model.bodies, h)
+    if model.attracts:
+        book_attraction(model, work, work.neighbours.status[2], state.sums)
 
 
 @compiled

@@ -30,6 +30,7 @@ from polycorner.motion.engine.arrays import (
     SETTLED,
     SOLVED,
 )
+from polycorner.motion.engine.attraction import attract, forget_attraction
 from polycorner.motion.engine.blocks import renew_blocks
 from polycorner.motion.engine.contact_list import EXIT, MOTION, REST, record, record_contacts
 from polycorner.motion.engine.crowds import is_crowd, renew_ranks
@@ -81,6 +82,8 @@ def solve(model, state, work, h, time, index, solved):
                 contacts = detect_contacts(model, state, work, h, contacts)
                 if contacts < 0:
                     return False, blocks
+                if model.attracts and attract(model, mid, pair, found, contacts, h):
+                    start_bodies(model, state, work, h)
             blocks = assemble_blocks(model, state, work, h, contacts, found == 0)
         solve_islands(model, state, work, blocks, h, solved > 0)
         store_all_impulses(model, state, work, blocks, h)
@@ -138,6 +141,8 @@ def attempt(model, state, work, h, time, index, any_awake):
     island = work.island
     blocks = ZERO
     unsettle(model, island)
+    if model.attracts:
+        forget_attraction(model, work.mid)
     if model.limits > 0:
         begin_limits(model, work, time + 0.5 * h)
     for trial in range(FORCE_ROUNDS):
