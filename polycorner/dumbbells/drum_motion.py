@@ -9,8 +9,8 @@ out, is ``(S sin(phi_i) - W cos(phi_i)) (rho + delta_i) + P eta_i``, and it pres
 
     N_i = W cos(phi_i) - S sin(phi_i) + (delta_i' / rho) (W sin(phi_i) + S cos(phi_i))
 
-if that is positive, else with 0; if it clings to the wall, with so much more.  What differs from the energy of the perfect drum at rest is an
-applied force, so that its work is booked.
+if that is positive, else with 0; if it clings to the wall, with so much more.  What differs from
+the energy of the perfect drum at rest is an applied force, so that its work is booked.
 """
 
 import math

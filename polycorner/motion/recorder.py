@@ -45,7 +45,13 @@ FLAGS = (
 )
 TIES = {name for name in EngineState._fields if name.startswith("tie_")}
 LIMITS = {name for name in EngineState._fields if name.startswith("limit_")}
-NOW = {"rank", "body_of_rank", "stopped", *TIES, *LIMITS}  # not in states saved before there were these
+NOW = {
+    "rank",
+    "body_of_rank",
+    "stopped",
+    *TIES,
+    *LIMITS,
+}  # not in states saved before there were these
 WORK = {"substrate": SUBSTRATE_WORK, "applied": APPLIED_WORK, "noise": NOISE_WORK}
 
 

@@ -37,6 +37,9 @@ def driven(
     lowest: float = -8.0,
     highest: float = 14.0,
     restitution: float = 0.0,
+    cohesion: float = 0.0,
+    adhesion: float = 0.0,
+    scatter: float = 0.0,
     duration: float = 400.0,
     dt: float = 0.001,
 ) -> dict[str, Any]:
@@ -77,6 +80,10 @@ def driven(
         First headings of right-handed pairs, in degrees.
     restitution : float
         Of dumbbells that collide.
+    cohesion, adhesion : float
+        Attraction of dumbbells by each other, at each contact, and by the wall, over their weight.
+    scatter : float
+        Relative standard deviation of the threshold of rolling, drawn anew at every stop.
     duration, dt : float
         In s.
 
@@ -85,13 +92,16 @@ def driven(
     dict
         Of single dumbbells: ``single_rate`` in 1/s, the change of the heading in the first quarter
         of the time, over the heading at the start and that time; ``single_kept``, the heading in
-        the last quarter over that at the start; ``single_climb_rate`` in mm/s over the last half.
+        the last quarter over that at the start; ``single_climb_rate`` in mm/s over the last half;
+        ``single_carried``, the azimuth in degrees at which they leave rest, and
+        ``single_highest``, the greatest of the last half.
         Of pairs, once with ``_right`` and once with ``_left``, with their own signs: means over
         the last half and over the pairs that held together, ``heading`` in degrees, ``shift`` in
         mm, ``climb_rate`` in mm/s; ``early`` and ``late``, the headings of the third and the last
         quarter, their difference ``drift``, and ``settled``, whether it is zero within two standard
         errors; ``spread``, the standard deviation of ``late`` over the pairs; ``samples``, the
-        number of headings that are independent in time; ``relaxation``, the time in s in which
+        number of headings that are independent in time; ``carried`` and ``highest``, as of single
+        dumbbells; ``relaxation``, the time in s in which
         headings come together to 1/e of their first spread; ``corner``, the share of time with the
         three contacts of the nested pair closed to 0.1 mm (of all five pairs); ``held``, the number
         of pairs.  Means have a standard ``_error`` over the pairs or dumbbells; shaking, unlike
@@ -112,7 +122,9 @@ def driven(
     real("lowest", lowest, least=-TURN, most=TURN, unit="deg")
     real("highest", highest, least=-TURN, most=TURN, unit="deg")
     drum = DumbbellDrum(length, tilt=math.radians(tilt), spin=spin, restitution=restitution)
+    drum = replace(drum, cohesion=cohesion, adhesion=adhesion)
     drum, noise = disturbed(drum, kind, strength, scale, int(rng.integers(2**63)))
+    noise = replace(noise, scatter={"rolling": scatter})
     places = _places(drum, np.radians(np.linspace(lowest, highest, PAIRS)).tolist())
     path = follow_pairs(drum, places, duration, noise=noise, dt=dt).trajectory
     first, middle = len(SINGLES), len(SINGLES) + 2 * PAIRS
@@ -122,6 +134,11 @@ def driven(
         **_singles(path),
         **_pairs("right", right, steady(right, after=half)),
         **_pairs("left", left, steady(left, after=half)),
+        **_carried(
+            path,
+            {"single_{}": (0, first)}
+            | {"{}_right": (first, middle), "{}_left": (middle, middle + 2 * PAIRS)},
+        ),
         "missed": path.missed,
     }
 
@@ -226,6 +243,23 @@ def _pairs(hand: str, paths: "DyadPaths", found: "Steady") -> dict[str, Any]:
         "held": found.held,
     }
     return _with_errors(means) | {f"{name}_{hand}": value for name, value in others.items()}
+
+
+def _carried(path: "Trajectory", groups: dict[str, tuple[int, int]]) -> dict[str, Any]:
+    """Return the azimuths at which groups of dumbbells leave rest, and the greatest they reach."""
+    from polycorner.dumbbells.drum import drum_of
+    from polycorner.dumbbells.dynamics.singles import Mean, zigzags
+
+    slips, half = zigzags(path, drum_of(path).spin), len(path) // 2
+    found = {}
+    for name, (first, last) in groups.items():
+        means = [one.upper.mean() for one in slips[first:last] if len(one)]
+        carried = Mean.of(np.degrees(means))
+        highest = np.degrees(path.q[half:, first:last, 0].max())
+        found[name.format("carried")] = (carried.value, "deg")
+        found[name.format("carried") + "_error"] = (carried.error, "deg")
+        found[name.format("highest")] = (float(highest), "deg")
+    return found
 
 
 def _with_errors(means: dict[str, Any]) -> dict[str, Any]:
