@@ -44,7 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             parser.error(f"{folder}: {error}")
         options.out.mkdir(parents=True, exist_ok=True)
         bunches = "exit_time" in found
-        text = told_of_bunches(found) if bunches else table([*driven(found)])
+        rows = attracted if "cohesion" in found.dims else driven
+        text = told_of_bunches(found) if bunches else table([*rows(found)])
         write_atomically(options.out / f"{name}.md", text.encode())
         if bunches:
             content = ",\n".join(map(json.dumps, runs(found)))
@@ -174,6 +175,26 @@ def driven(found: xr.Dataset) -> Iterator[Row]:
             "rate (1/s)": number(value["single_rate"], 4),
             "kept": number(value["single_kept"], 2),
             "climb, single": number(value["single_climb_rate"], 3),
+        }
+
+
+def attracted(found: xr.Dataset) -> Iterator[Row]:
+    """Yield rows of ``driven`` over attraction and scatter: how high, which heading, how fast."""
+    for axes, one in points(found):
+        value = {str(name): float(x) for name, x in one.data_vars.items() if x.dtype.kind in "fi"}
+        yield {
+            **{words(name): short(x) for name, x in axes.items()},
+            "carried, single": with_error(
+                value["single_carried"], value["single_carried_error"], 1, "°"
+            ),
+            "carried R": with_error(value["carried_right"], value["carried_right_error"], 1, "°"),
+            "highest R": f"{number(value['highest_right'], 1)}°",
+            **headings(value, "right", "R"),
+            "climb R": number(value["climb_rate_right"], 2),
+            **headings(value, "left", "L"),
+            "climb L": number(value["climb_rate_left"], 2),
+            "held R, L": f"{value['held_right']:.0f}, {value['held_left']:.0f}",
+            "climb, single": number(value["single_climb_rate"], 2),
         }
 
 

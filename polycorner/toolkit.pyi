@@ -28,6 +28,7 @@ from .files.motions import (
 )
 from .formulas.bundles import Call
 from .formulas.cache import cache_folder, source_key
+from .formulas.functions import with_numbers
 from .intervals.boxes import BoxFunctions
 from .kinds import check_fields, checked
 from .landscapes.steepest import steepest
@@ -150,6 +151,7 @@ __all__ = [
     "wave_depth",
     "waves",
     "whole",
+    "with_numbers",
     "write_atomically",
     "write_frames",
 ]

@@ -79,14 +79,11 @@ class DumbbellDrum(MechanicalSystem):
         Whether the drum has a flat bottom at ``eta = 0``.
     top : float
         Where the drum ends, in mm: a dumbbell whose centre passes it has left; ``inf``: never.
-    cohesion : float
-        Force with which dumbbells attract each other where they touch, at each contact, over the
-        weight of a dumbbell; it falls to zero at the gap ``cohesion_range``
-        (:class:`~polycorner.motion.Attraction`).
-    adhesion : float
-        Force with which the wall attracts a dumbbell, half at each ball, over its weight.
-    cohesion_range : float
-        In mm.
+    cohesion, adhesion : float
+        Force over the weight of a dumbbell with which dumbbells that touch attract each other, at
+        each contact, and with which the wall attracts a dumbbell, half at each ball.
+    attraction_range : float
+        Gap in mm at which they vanish (:class:`~polycorner.motion.Attraction`).
     shaking, out_of_round, wobble, uneven_friction : optional
         :class:`Shaking`, :class:`OutOfRound`, :class:`Wobble` and :class:`UnevenFriction`, the
         imperfections of a real drum; none by default.
@@ -119,7 +116,7 @@ class DumbbellDrum(MechanicalSystem):
     top: float = math.inf
     cohesion: float = 0.0
     adhesion: float = 0.0
-    cohesion_range: float = 0.05
+    attraction_range: float = 0.05
     shaking: Shaking | None = None
     out_of_round: OutOfRound | None = None
     wobble: Wobble | None = None
@@ -137,7 +134,7 @@ class DumbbellDrum(MechanicalSystem):
         real("ball_mass", self.ball_mass, above=0, unit="g")
         real("cohesion", self.cohesion, least=0)
         real("adhesion", self.adhesion, least=0)
-        real("cohesion_range", self.cohesion_range, above=0, most=self.rod_radius, unit="mm")
+        real("attraction_range", self.attraction_range, above=0, most=self.rod_radius, unit="mm")
         real("top", self.top, above=0, infinite=True, unit="mm")
         flag("floor", self.floor)
         self.imperfections.check(self.tilt, self.centre_radius)
@@ -157,6 +154,12 @@ class DumbbellDrum(MechanicalSystem):
             msg = "drum_radius: expected a finite length in mm; got inf"
             raise ValueError(msg)
         return pair
+
+    @checked
+    def attraction(self, share: float) -> Attraction | None:
+        """Return the attraction by a share of the weight of a dumbbell; None if it is 0."""
+        force = real("share", share, least=0) * 2 * self.ball_mass * GRAVITY
+        return Attraction(force, self.attraction_range) if share else None
 
     @property
     def centre_radius(self) -> float:
@@ -228,9 +231,7 @@ class DumbbellDrum(MechanicalSystem):
             (PairLaw(2, Disc(self.rubbing[0]), Disc(self.rubbing[1])),),
             float(self.restitution),
             reach,
-            Attraction(self.cohesion * 2 * self.ball_mass * GRAVITY, self.cohesion_range)
-            if self.cohesion
-            else None,
+            self.attraction(self.cohesion),
         )
 
     @checked

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, Mass, capsule, compound, sphere
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.drum_motion import effective_gravity, uneven_factor
-from polycorner.motion import Friction, State, System
+from polycorner.motion import ContactFamily, Friction, State, System
 from polycorner.toolkit import (
     LONGEST,
     Array,
@@ -32,6 +32,7 @@ from polycorner.toolkit import (
     reals,
     refuse,
     wave_depth,
+    with_numbers,
 )
 
 BALLS = ("D.1-drum", "D.2-drum")  # contacts of the balls with the drum
@@ -47,7 +48,8 @@ class RigidDumbbells(Checked):
     drum : DumbbellDrum
         Lengths, tilt, spin, friction and masses: two balls, each of uniform density, on a rod
         without mass.  ``top`` and ``floor`` are the ends of the drum.  Shaking and a wobble change
-        the effective gravity; the inside of a wall that is out of round has to be convex.
+        the effective gravity; attraction acts at gaps; the inside of a wall that is out of round
+        has to be convex.
 
     Raises
     ------
@@ -127,6 +129,13 @@ class RigidDumbbells(Checked):
             count=drum.count,
         )
         assert isinstance(system, System)  # of one kind
+        if between := drum.attraction(drum.cohesion):
+            assert isinstance(system.between, ContactFamily)  # of rounded bodies
+            system = replace(system, between=replace(system.between, attraction=between))
+        if wall := drum.attraction(drum.adhesion / 2):
+            gaps = [with_numbers(f) for f in system.polyhedron.functions if f.name in BALLS]
+            potential = sum(map(wall.energy, gaps), system.potential)
+            system = replace(system, potential=potential)
         if drum.uneven_friction is None:
             return system
         return replace(system, friction=tuple(map(self._uneven, system.friction)))

@@ -45,13 +45,8 @@ FLAGS = (
 )
 TIES = {name for name in EngineState._fields if name.startswith("tie_")}
 LIMITS = {name for name in EngineState._fields if name.startswith("limit_")}
-NOW = {
-    "rank",
-    "body_of_rank",
-    "stopped",
-    *TIES,
-    *LIMITS,
-}  # not in states saved before there were these
+# Not in states saved before there were these.
+NOW = {"rank", "body_of_rank", "stopped", *TIES, *LIMITS}
 WORK = {"substrate": SUBSTRATE_WORK, "applied": APPLIED_WORK, "noise": NOISE_WORK}
 
 

@@ -77,6 +77,20 @@ def test_pairs_have_a_row_for_each_point(tmp_path):
         assert float(line[head.index("kept")]) == round(float(found["single_kept"][k]), 2)
 
 
+def test_attraction_and_scatter_have_a_row_for_each_point(tmp_path):
+    from polycorner.dumbbells.studies import driven
+
+    fixed = {"kind": "kicks", "strength": 0.0, "scale": 0.003, "duration": 16.0, "dt": 0.002}
+    axes, store = {"cohesion": [0.0, 0.1], "scatter": [0.3]}, tmp_path / "glue" / "sweep.zarr"
+    found = sweep(driven, axes, fixed=fixed, rng=1, store=str(store))
+    main(["glue", "--stores", str(tmp_path), "--out", str(tmp_path)])
+    head, _, *lines = rows((tmp_path / "glue.md").read_text(encoding="utf-8"))
+    assert [line[head.index("cohesion")] for line in lines] == ["0", "0.1"]
+    for k, line in enumerate(lines):
+        highest = float(found["highest_right"][k, 0])
+        assert line[head.index("highest R")] == f"{highest:.1f}°"
+
+
 def test_a_study_that_was_not_computed_is_named(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["nothing", "--stores", str(tmp_path), "--out", str(tmp_path)])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from polycorner.dumbbells import DumbbellDrum, OutOfRound
+from polycorner.dumbbells import DumbbellDrum, OutOfRound, RigidDumbbells
 from polycorner.dumbbells.drum import GRAVITY
 from polycorner.motion import EventKind, Noise, Solver, simulate
 
@@ -39,7 +39,7 @@ def test_a_pair_rolls_when_weight_overcomes_rolling_and_rubbing(cohesion):
     Surfaces that touch slip by ``1 + t/r`` times the way of the centres, at the rods and, as
     ``(r + t)/r`` is the same, between the balls; almost all that presses is the attraction.
     """
-    drum = DumbbellDrum(count=2, cohesion=cohesion, cohesion_range=0.5, **LEVEL)
+    drum = DumbbellDrum(count=2, cohesion=cohesion, attraction_range=0.5, **LEVEL)
     places = drum.pair.nested("R", heading=0.0, clearance=3e-4).reshape(2, 3)
     path, time = onset(drum, places, every=1)
     at = path.at(time)
@@ -55,7 +55,7 @@ def test_a_pair_rolls_when_weight_overcomes_rolling_and_rubbing(cohesion):
 def test_pairs_in_reach_of_each_other_are_pulled_with_the_stated_force():
     """Of parallel dumbbells without friction, at the gap ``g`` between ball and ball."""
     drum = DumbbellDrum(
-        count=2, cohesion=0.2, cohesion_range=0.5, spin=0.0, tilt=0.0,
+        count=2, cohesion=0.2, attraction_range=0.5, spin=0.0, tilt=0.0,
         sliding=(0, 0), rolling=(0, 0), rubbing=(0, 0),
     )  # fmt: skip
     gap = 0.3
@@ -86,13 +86,37 @@ def test_thresholds_of_rolling_scatter_from_dumbbell_to_dumbbell():
     assert logs.std() == pytest.approx(width, rel=4 / math.sqrt(2 * count))
 
 
+def test_in_space_a_dumbbell_rolls_where_it_does_on_the_developed_drum():
+    """But that the weight acts at the centres and friction at the wall: by ``r/R`` of it."""
+    drum = DumbbellDrum(adhesion=0.5, spin=0.05, **LEVEL)
+    rigid = RigidDumbbells(drum)
+    path = simulate(rigid.system, rigid.state([0.1, 0.0, 0.0]), 3.0, 1e-3, every=10)
+    started = next(e.time for e in path.of_kind(EventKind.MOTION) if e.time > 0.1)
+    turned = math.atan(ROLLING)
+    expected = turned + math.asin(ROLLING * drum.adhesion * math.cos(turned))
+    assert 0.1 + drum.spin * started == pytest.approx(expected, rel=2 * 3.0 / 125.0)
+
+
+def test_in_space_pairs_are_pulled_with_the_same_force():
+    drum = DumbbellDrum(
+        count=2, cohesion=0.2, attraction_range=0.5, spin=0.0, tilt=0.0,
+        sliding=(0, 0), rolling=(0, 0), rubbing=(0, 0),
+    )  # fmt: skip
+    apart = (2 * drum.ball_radius + 0.3 + drum.length) / 2
+    rigid = RigidDumbbells(drum)
+    path = simulate(rigid.system, rigid.state([[0, -apart, 0], [0, apart, 0]]), 1e-3, 1e-3)
+    force = 0.2 * 2 * drum.ball_mass * GRAVITY * (1 - 0.3 / 0.5)
+    speed = force / (2 * drum.ball_mass) * 1e-3
+    assert path.v[-1, :, 1] == pytest.approx([speed, -speed], rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("given", "told"),
     [
         ({"cohesion": -0.1}, "cohesion: expected"),
         ({"adhesion": math.nan}, "adhesion: expected"),
-        ({"cohesion_range": 0.0}, "cohesion_range: expected"),
-        ({"cohesion_range": 2.0}, "cohesion_range: expected"),
+        ({"attraction_range": 0.0}, "attraction_range: expected"),
+        ({"attraction_range": 2.0}, "attraction_range: expected"),
     ],
 )
 def test_forces_that_do_not_attract_are_refused(given, told):

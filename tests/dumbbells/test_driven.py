@@ -39,8 +39,9 @@ def test_every_kind_has_the_same_results_with_units(kind):
     found = driven(kind, *USUAL[kind], rng=np.random.default_rng(4), duration=0.4)
     units = {name: value[1] for name, value in found.items() if isinstance(value, tuple)}
     means = {"single_rate": "1/s", "single_kept": "1", "single_climb_rate": "mm/s"}
+    means |= {"single_carried": "deg", "single_highest": "deg"}
     for hand in ("right", "left"):
-        for name in ("heading", "early", "late", "drift", "spread"):
+        for name in ("heading", "early", "late", "drift", "spread", "carried", "highest"):
             means[f"{name}_{hand}"] = "deg"
         means |= {f"shift_{hand}": "mm", f"climb_rate_{hand}": "mm/s"}
         means[f"relaxation_{hand}"] = "s"
@@ -48,7 +49,7 @@ def test_every_kind_has_the_same_results_with_units(kind):
         assert found[f"held_{hand}"] == PAIRS
         assert 0 <= found[f"corner_{hand}"] <= 1
         assert found[f"settled_{hand}"] in {True, False}
-    whole = ("spread", "relaxation")
+    whole = ("spread", "relaxation", "highest", "single_highest")
     errors = {f"{n}_error": unit for n, unit in means.items() if not n.startswith(whole)}
     assert units == means | errors
     assert found["missed"] < 0.1

@@ -218,12 +218,13 @@ def follow_pairs(
     noise: Noise | None = None,
     dt: float = 2e-3,
     interval: float = 0.1,
+    solver: Solver = SOLVER,
 ) -> DyadPaths:
     """Follow pairs of dumbbells from rest at ``places``, ``(2 n, 3)``; see :class:`DyadPaths`."""
     real("dt", dt, least=SHORTEST_STEP, unit="s")
     many = replace(drum, count=len(np.asarray(places)))
     start, every = many.state(places), max(1, round(interval / dt))
-    return DyadPaths(simulate(many, start, duration, dt, every=every, noise=noise, solver=SOLVER))
+    return DyadPaths(simulate(many, start, duration, dt, every=every, noise=noise, solver=solver))
 
 
 def heading_at_shift(drum: DumbbellDrum, shift: float) -> float:

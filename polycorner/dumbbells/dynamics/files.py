@@ -44,7 +44,11 @@ UNITS = {
     "ball_mass": "g",
     "floor": "1 if there is a bottom at eta = 0",
     "top": "mm",
+    "cohesion": "weight of a dumbbell",
+    "adhesion": "weight of a dumbbell",
+    "attraction_range": "mm",
 }
+LATER = ("cohesion", "adhesion", "attraction_range")  # not in runs saved before there were these
 PLACES = (
     ("phi", "rad", "azimuth, not wrapped"),
     ("eta", "mm", "axial position"),
@@ -114,6 +118,8 @@ def _read(content: "xr.Dataset") -> Trajectory:
             if field.name in at:
                 told = json.loads(at[field.name])
                 values[field.name] = KINDS[field.name].restored(told)
+            continue
+        if field.name in LATER and field.name not in at:
             continue
         value = at[field.name]
         if field.name in ("count", "floor"):

@@ -40,6 +40,7 @@ def driven(
     cohesion: float = 0.0,
     adhesion: float = 0.0,
     scatter: float = 0.0,
+    refine: bool = True,
     duration: float = 400.0,
     dt: float = 0.001,
 ) -> dict[str, Any]:
@@ -84,6 +85,8 @@ def driven(
         Attraction of dumbbells by each other, at each contact, and by the wall, over their weight.
     scatter : float
         Relative standard deviation of the threshold of rolling, drawn anew at every stop.
+    refine : bool
+        Whether impacts act within steps, where dumbbells meet; not needed without noise.
     duration, dt : float
         In s.
 
@@ -114,7 +117,7 @@ def driven(
         Naming the argument, what was expected and what came.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_pairs
+    from polycorner.dumbbells.dynamics.dyads import SOLVER, DyadPaths, follow_pairs
     from polycorner.dumbbells.dynamics.steady import steady
 
     real("tilt", tilt, unit="deg")
@@ -126,7 +129,8 @@ def driven(
     drum, noise = disturbed(drum, kind, strength, scale, int(rng.integers(2**63)))
     noise = replace(noise, scatter={"rolling": scatter})
     places = _places(drum, np.radians(np.linspace(lowest, highest, PAIRS)).tolist())
-    path = follow_pairs(drum, places, duration, noise=noise, dt=dt).trajectory
+    solver = replace(SOLVER, refine=refine)
+    path = follow_pairs(drum, places, duration, noise=noise, dt=dt, solver=solver).trajectory
     first, middle = len(SINGLES), len(SINGLES) + 2 * PAIRS
     right, left = DyadPaths(path, first, middle), DyadPaths(path, middle)
     half = duration / 2
