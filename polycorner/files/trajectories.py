@@ -334,7 +334,9 @@ def _between(family: ContactFamily | HullContacts | None) -> dict[str, Any] | No
         return family.described()
     if family is None:
         return None
+    pull = family.attraction
     return {
+        **({} if pull is None else {"attraction": [pull.force, pull.range]}),
         "gaps": {name: formula_text(gap) for name, gap in family.gaps.items()},
         "friction": [
             [

@@ -135,6 +135,8 @@ class Drift(MechanicalSystem, Printed):
             refuse("exits", "one coordinate", sorted(self.exits))
         if self.between is not None:
             names("position", self.between.position, self.manifold.names)
+            if isinstance(self.between, ContactFamily) and self.between.attraction is not None:
+                refuse("between", "contacts without attraction", self.between.attraction)
         _ = self.mobility_formulas, self.flow, self.bodies, self.energy
         super().__post_init__()
 

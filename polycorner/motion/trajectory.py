@@ -85,9 +85,9 @@ class Trajectory(Checked, Printed):
     work : mapping from str to (T,) array
         Work done until each instant by the moving ``substrate``, by ``applied`` forces and by
         ``noise``, by the ``drive`` of equations with the time, by each limit on velocities and each
-        nonholonomic equation, by its name, and what ``left`` with bodies that left (negative).  Of
-        a :class:`~polycorner.Drift` by the wished ``velocity`` and by ``noise``; all of it is
-        dissipated by ``drag``.
+        nonholonomic equation, by its name, by the ``attraction`` of bodies, and what ``left`` with
+        bodies that left (negative).  Of a :class:`~polycorner.Drift` by the wished ``velocity`` and
+        by ``noise``; all of it is dissipated by ``drag``.
     events : sequence of Event
         In time.  They are held as arrays; each becomes an object when it is asked for.
     max_penetration : float

@@ -8,9 +8,11 @@ import pytest
 import sympy
 
 from polycorner import Manifold, Polyhedron, System, velocities
+from polycorner.files import load_trajectory, save_trajectory
 from polycorner.motion import (
     Attraction,
     ContactFamily,
+    Drift,
     EventKind,
     Friction,
     Interval,
@@ -22,6 +24,7 @@ LINE, PLANE = Manifold.euclidean("x"), Manifold.euclidean("x y")
 (S,), (VS,) = LINE.symbols, velocities(LINE)
 (X, Y), (VX, VY) = PLANE.symbols, velocities(PLANE)
 ONE, TWO = (bodies[0] for bodies in pair_coordinates(LINE))
+LINE_SEGMENT = Polyhedron(LINE, {"left": 1e3 + S, "right": 1e3 - S})
 FAR, MASS, G, SIZE = 1e3, 2.0, 9.81, 1.0
 GLUE = Attraction(force=3.0, range=0.02)
 
@@ -199,6 +202,20 @@ def test_energy_is_minus_the_integral_of_the_force():
 def test_an_attraction_that_is_none_is_refused(force, reach, named):
     with pytest.raises(ValueError, match=f"{named}: expected"):
         Attraction(force, reach)
+
+
+def test_first_order_motion_has_no_attraction_between_bodies():
+    with pytest.raises(ValueError, match="between: expected contacts without attraction"):
+        Drift(LINE_SEGMENT, {}, count=2, between=balls().between)
+
+
+def test_a_file_tells_of_attraction(tmp_path):
+    system = balls()
+    path = simulate(system, placed(system, 0.01), 0.01, 1e-3)
+    save_trajectory(path, tmp_path / "run")
+    assert (load_trajectory(tmp_path / "run", system).work["attraction"] > 0)[1:].all()
+    with pytest.raises(ValueError, match="attraction"):
+        load_trajectory(tmp_path / "run", balls(replace(GLUE, force=2.0)))
 
 
 def test_what_is_no_attraction_is_refused():
