@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from polycorner.branches.enclosed_arcs import EnclosedArc, Watched
 from polycorner.branches.enclosed_events import EnclosedEvent, Through, about_event
+from polycorner.branches.pitchforks import Pitchfork
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.branches.tubes import CurveSystem, Setting, Tube
@@ -95,7 +96,7 @@ class Cover:
         self,
         setting: Setting,
         lifted: Problem,
-        tubes: Sequence[Tube],
+        tubes: Sequence[Tube | Pitchfork],
         sides: tuple[Array, Array],
         options: BranchProofOptions,
     ) -> None:
@@ -107,7 +108,7 @@ class Cover:
         self.units = np.append(setting.units[: self.n], (sides[1][-1] - sides[0][-1]) / 5)
         # Boxes by size: met, looked at with the tubes, and closed or narrowed there.
         self.met, self.tried, self.gained = Counter[int](), Counter[int](), Counter[int]()
-        self.tubes: dict[Face, list[tuple[Tube, Array, Array]]] = {}
+        self.tubes: dict[Face, list[tuple[Tube | Pitchfork, Array, Array]]] = {}
         for one in tubes:
             hull = [*one.solution[: self.n], setting.time(one.solution[self.n :])]
             ends = np.array([[float(x.lower()), float(x.upper())] for x in hull]).T
@@ -273,9 +274,9 @@ class Cover:
                 break
         return x
 
-    def _near(self, face: Face, x: "list[Ball]") -> list[Tube]:
+    def _near(self, face: Face, x: "list[Ball]") -> list[Tube | Pitchfork]:
         """Return the tubes of a face that meet a box."""
-        found, box = [], self._sharp(x)
+        found, box = list[Tube | Pitchfork](), self._sharp(x)
         for one, low, high in self.tubes.get(face, []):
             shift = np.zeros(self.n + 1)
             for i, p in enumerate(self.periods):
@@ -285,7 +286,7 @@ class Cover:
                 found.append(one)
         return found
 
-    def _turned(self, hull: "list[Ball]", one: Tube) -> "list[Ball]":
+    def _turned(self, hull: "list[Ball]", one: Tube | Pitchfork) -> "list[Ball]":
         """Return a box with whole turns added around circles, to where a tube is."""
         result = list(hull)
         for i, p in enumerate(self.periods):

@@ -30,6 +30,7 @@ from polycorner.branches.tubes import (
 )
 from polycorner.intervals.balls import ball
 from polycorner.intervals.enclosures import Undecided
+from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import bordered, newton
 from polycorner.proofs.lists.faces import inertia
 from polycorner.spaces.manifold import Array
@@ -73,16 +74,28 @@ class Watched:
         """Its derivative."""
         return self.inequalities + 3
 
+    def at(self, setting: Setting, face: Face, x: "Sequence[Ball]") -> "list[Ball]":
+        """Return enclosures of all that is watched but the derivative, on a box of unknowns."""
+        box = Box([*x[: len(setting.units)], ball(0)])
+        values = setting.formulas.values(box, range(self.inequalities))
+        return self._assembled(setting, face, x, values)
+
     def values(self, tube: Tube) -> "list[Ball]":
         """Return enclosures of all that is watched, along a tube."""
-        setting, d, m = tube.system.setting, tube.system.dimension, self.inequalities
-        x, v = tube.solution, tube.velocity
-        found = tube.values(range(m))
-        for place, i in enumerate(tube.face, d):
+        setting, v = tube.system.setting, tube.velocity
+        found = self._assembled(
+            setting, tube.face, tube.solution, tube.values(range(self.inequalities))
+        )
+        return [*found, ball(0, 1) if v is None else self.by_time(setting, v)]
+
+    def _assembled(
+        self, setting: Setting, face: Face, x: "Sequence[Ball]", found: "list[Ball]"
+    ) -> "list[Ball]":
+        d = len(setting.units)
+        for place, i in enumerate(face, d):
             found[i] = x[place]
         t = setting.time(x[setting.n : d])
-        turn = ball(0, 1) if v is None else self._by_time(setting, v)
-        return [*found, x[-1], t - ball(self.low), ball(self.high) - t, turn]
+        return [*found, x[-1], t - ball(self.low), ball(self.high) - t]
 
     def rate(self, tube: Tube, which: int) -> "Ball | None":
         """Return an enclosure of the derivative of something that is watched, by the pin."""
@@ -97,12 +110,13 @@ class Watched:
             return v[-1]
         if which == self.turn:
             a = tube.acceleration
-            return None if a is None else self._by_time(setting, a)
-        t = self._by_time(setting, v)
+            return None if a is None else self.by_time(setting, a)
+        t = self.by_time(setting, v)
         return t if which == self.start else -t
 
     @staticmethod
-    def _by_time(setting: Setting, x: "Sequence[Ball]") -> "Ball":
+    def by_time(setting: Setting, x: "Sequence[Ball]") -> "Ball":
+        """Return the derivative of the parameter, of those of all unknowns."""
         k = setting.moved
         return x[k] / ball(setting.rates[k - setting.n])
 

@@ -338,7 +338,7 @@ class _Event:
         return [Arm(face, int(bool(s * turn < 0)), x) for s in sides]
 
     def _through(self, system: CurveSystem, x: "list[Ball]", weak: Sequence[int]) -> Array | None:
-        direction = _direction(system, x)
+        direction = direction_at(system, x)
         if direction is not None:
             self.curves.append(Through(system.face, x, direction, tuple(weak)))
         return direction
@@ -400,8 +400,8 @@ def _balls(x: Array) -> "list[Ball]":
     return [ball(value) for value in x.tolist()]
 
 
-def _direction(system: CurveSystem, x: "Sequence[Ball]") -> Array | None:
-    """Return the unit tangent of a curve at a point, in units, approximately."""
+def direction_at(system: CurveSystem, x: "Sequence[Ball]") -> Array | None:
+    """Return the unit tangent of a curve at a point, in units, approximately; None if none."""
     some = system.coordinate(0).at(x)
     if isinstance(some, Undecided):
         return None

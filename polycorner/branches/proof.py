@@ -5,13 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner import checks
 from polycorner.branches.covering import Cover, all_tubes
-from polycorner.branches.diagram import Arc, BranchKind, Diagram
+from polycorner.branches.diagram import Arc, BranchEvent, BranchKind, Diagram
 from polycorner.branches.enclosed_arcs import EnclosedArc, Watched, enclosed_arc
 from polycorner.branches.enclosed_events import (
     EnclosedEvent,
@@ -19,25 +19,28 @@ from polycorner.branches.enclosed_events import (
     enclosed_event,
     null_unknowns,
 )
+from polycorner.branches.mirrors import images
+from polycorner.branches.pitchforks import Pitchfork, pitchfork
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.saving import Evidence, ProvedArc, save_proof
-from polycorner.branches.tubes import PIN, CurveSystem, Image, Setting, point
+from polycorner.branches.tubes import PIN, CurveSystem, Setting, Tube, point
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
 from polycorner.minimisation.parametric import lifted_problem
-from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, facts, listed, number
 from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.faces import outward
-from polycorner.proofs.lists.images import motion, permutation
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 from polycorner.values import Checked
+
+if TYPE_CHECKING:
+    from polycorner.intervals.balls import Ball
 
 Interval = tuple[float, float]
 
@@ -181,8 +184,10 @@ def prove_branches(
     Of an arc it is proved that there is exactly one curve of equilibria near its points, on which
     its functions are active, with positive multipliers, and no others, the parameter is monotone
     and the index is that of the arc; of an event, that its arcs end there, in one point, and that
-    no other equilibria leave it.  Of pitchforks and other events where curves cross, of several
-    functions that vanish at once, and of unions nothing is proved; they are *followed*.
+    no other equilibria leave it.  Branch points are proved where a symmetry breaks, as pitchforks
+    (:mod:`~polycorner.branches.pitchforks`).  Of other events where curves cross, of several
+    functions that vanish at once without a symmetry, and of unions nothing is proved; they are
+    *followed*.
 
     Parameters
     ----------
@@ -193,7 +198,8 @@ def prove_branches(
         if there are none the diagram is *complete* there.
     symmetry : Symmetry, optional
         Its ``elements``, signed permutations of the coordinates, show that several functions vanish
-        at once.
+        at once, and pitchforks.  For these symmetries of the energy and the active functions are
+        also looked for among the signed permutations that take one curve to another.
     options : BranchProofOptions, optional
     progress : callable, optional
         Told the number of arcs done and of all, and of boxes.
@@ -246,20 +252,50 @@ class _Prover:
         self.diagram, self.options = diagram, options
         self.problem = problem = diagram.problem
         self.names = [f.name for f in problem.functions]
-        self.setting = _setting(diagram, symmetry)
+        self.setting = _setting(diagram, symmetry, options.most_images)
         low, high = (Fraction(x) for x in diagram.interval)
         self.watched = Watched(problem.inequalities, low, high)
         self.tolerances = Tolerances()
+        self.pitchforks = {
+            k: self._pitchfork(event)
+            for k, event in enumerate(diagram.events) if event.kind is BranchKind.BRANCH
+        }  # fmt: skip
+
+    def _pitchfork(self, event: BranchEvent) -> Pitchfork | Undecided:
+        """Return the pitchfork of an event, of any symmetry that shows one."""
+        arcs = [self.diagram.arcs[k] for k in event.arcs]
+        found = Undecided("the branch point", "no symmetry of the formulas shows a pitchfork")
+        if len({arc.active for arc in arcs}) != 1:
+            return found
+        face = self._face(arcs[0])
+        places = [self._place(event.point, event.parameter)]
+        for arc in arcs:
+            middle = len(arc.points) // 2
+            places.append(self._place(arc.points[middle], arc.parameters[middle]))
+        at, *near = [null_unknowns(self.setting, face, place) for place in places]
+        if not np.isfinite([at, *near]).all():
+            return found
+        for g in self.setting.images:
+            one = pitchfork(self.setting, face, g, at, near, self.watched, self.options)
+            if isinstance(one, Pitchfork):
+                return one
+            found = one
+        return found
+
+    def _face(self, arc: Arc) -> tuple[int, ...]:
+        return tuple(sorted(self.names.index(name) for name in arc.active))
+
+    def _place(self, q: Array, t: float) -> Array:
+        """Return coordinates and formulas' parameters."""
+        line = zip(self.setting.start, self.setting.rates, strict=True)
+        return np.concatenate([q, [float(a + Fraction(t) * r) for a, r in line]])
 
     def arc(self, k: int) -> EnclosedArc:
         """Return what is shown of an arc."""
         arc, setting = self.diagram.arcs[k], self.setting
-        face = tuple(sorted(self.names.index(name) for name in arc.active))
+        face = self._face(arc)
         system = CurveSystem(setting, face)
-        places = [
-            np.concatenate([q, [float(a + Fraction(t) * r) for a, r in self._line()]])
-            for q, t in zip(arc.points, arc.parameters, strict=True)
-        ]
+        places = list(map(self._place, arc.points, arc.parameters.tolist()))
         points = [null_unknowns(setting, face, place) for place in places]
         last = points.pop()
         points = [
@@ -267,6 +303,9 @@ class _Prover:
               if np.linalg.norm((x - last) / system.units) > self.options.shortest),
             last,
         ]  # fmt: skip
+        for side, one in enumerate(map(self.pitchforks.get, arc.events)):
+            if isinstance(one, Pitchfork) and all(np.isfinite(x).all() for x in points):
+                points = one.cut(points, side, self.tolerances.near, self.options) or points
         zeros = self._zeros(k, 0, points[0], face), self._zeros(k, 1, points[-1], face)
         if not all(np.isfinite(x).all() for x in points) or len(points) < 2:
             ends = points[0], points[-1]
@@ -274,9 +313,6 @@ class _Prover:
         found = enclosed_arc(system, points, zeros, self.watched, self.options)
         wrong = found.reason or self._contradiction(arc, places, found)
         return replace(found, reason=wrong)
-
-    def _line(self) -> "list[tuple[Fraction, Fraction]]":
-        return list(zip(self.setting.start, self.setting.rates, strict=True))
 
     def _zeros(self, k: int, side: int, x: Array, face: tuple[int, ...]) -> frozenset[int]:
         """Return what seems to vanish at an end of an arc."""
@@ -317,7 +353,8 @@ class _Prover:
         if not np.allclose(values, arc.energies, rtol=same, atol=same):
             return "its energies are not those of its points"
         points = np.array([null_unknowns(setting, found.face, place) for place in places])
-        if not all(self._on(found, x) for x in points):
+        some = [f for f in map(self.pitchforks.get, arc.events) if isinstance(f, Pitchfork)]
+        if not all(self._on(found, x) or self._beside(some, points, x) for x in points):
             return "its points are not on the curve"
         inner = points[:, -1] > self.tolerances.beside
         weights = np.array([setting.weights[row] for row in rows])
@@ -331,17 +368,25 @@ class _Prover:
 
     def _on(self, found: EnclosedArc, x: Array) -> bool:
         """Whether a point is near the curve that is proved."""
-        same, near = self.tolerances.same, [ball(value) for value in x.tolist()]
+        near = [ball(value) for value in x.tolist()]
         for one in found.tubes:
             if not one.enclosure.predictor.cell.reach[0].contains(one.place(near)[0]):
                 continue
             there = point(one.system.pinned(one.system.normal, x.tolist()), near, self.options.bits)
             if not isinstance(there, Undecided) and one.contains(there.solution):
-                return all(
-                    abs(a - b) <= same * unit
-                    for a, b, unit in zip(there.solution, near, self.setting.units, strict=False)
-                )
+                return self._same(there.solution, x)
         return False
+
+    def _beside(self, some: Sequence[Pitchfork], points: Array, x: Array) -> bool:
+        """Whether a point of an arc is near a curve of a pitchfork."""
+        near, bits = self.tolerances.near, self.options.bits
+        evens = [one.is_trunk(list(points), near) for one in some]
+        pairs = zip(some, evens, strict=True)
+        return any(self._same(one.beside(x, even=even, bits=bits), x) for one, even in pairs)
+
+    def _same(self, known: "list[Ball]", x: Array) -> bool:
+        pairs = zip(known, x.tolist(), self.setting.units, strict=False)
+        return all(abs(a - ball(b)) <= self.tolerances.same * unit for a, b, unit in pairs)
 
     def event(self, k: int, arcs: Sequence[EnclosedArc]) -> EnclosedEvent:
         """Return what is shown of an event."""
@@ -356,7 +401,13 @@ class _Prover:
             {j for j, arc in enumerate(self.diagram.arcs) if k in arc.events}
         ):
             return EnclosedEvent([], reason="its arcs are not those that end there")
-        found = enclosed_event(self.setting, ends, self.watched, self.options)
+        one = self.pitchforks.get(k)
+        if isinstance(one, Undecided):
+            return EnclosedEvent([], reason=str(one))
+        if one is not None:
+            found = one.event(ends, self.tolerances.near, self.options.bits)
+        else:
+            found = enclosed_event(self.setting, ends, self.watched, self.options)
         if not found.reason and found.kind is not event.kind:
             return EnclosedEvent([], reason=f"it is of the kind {found.kind.name}")
         low, high = self.times(k, found)
@@ -379,7 +430,10 @@ class _Prover:
     ) -> Array:
         """Return boxes in which there may be equilibria that are not on the arcs."""
         interval = self.diagram.interval
-        tubes = all_tubes(self.setting, arcs, events, self.watched, self.options)
+        tubes: list[Tube | Pitchfork] = [
+            *all_tubes(self.setting, arcs, events, self.watched, self.options),
+            *(one for one in self.pitchforks.values() if isinstance(one, Pitchfork)),
+        ]
         lifted = lifted_problem(self.problem, tuple(self.diagram.rates))
         sides = np.append(box.lower, interval[0]), np.append(box.upper, interval[1])
         return Cover(self.setting, lifted, tubes, sides, self.options).run(progress)
@@ -402,31 +456,12 @@ class _Prover:
         return outward(self.setting.time(found.where[self.setting.n :]))
 
 
-def _images(lifted: Problem, symmetry: Symmetry, n: int, weights: Sequence[float]) -> list[Image]:
-    """Return the finite symmetries, for all values of the parameters."""
-    manifold, found = lifted.polyhedron.manifold, []
-    kept = tuple(range(n, manifold.size))
-    for element in symmetry.elements:
-
-        def carried(q: Array, apply: Any = element.apply) -> Array:
-            return np.concatenate([np.asarray(apply(q[:n])), q[n:]])
-
-        g = motion(manifold, carried, "symmetry")
-        functions = permutation(lifted, g)
-        if functions is None:
-            checks.refuse("symmetry", "elements that expanded formulas show to be symmetries", g)
-        same = all(weights[i] == weights[j] for i, j in enumerate(functions))
-        if same and not any(g.halves):
-            found.append(Image(g.order[: -len(kept)], g.signs[: -len(kept)], functions))
-    return found
-
-
-def _setting(diagram: Diagram, symmetry: Symmetry) -> Setting:
+def _setting(diagram: Diagram, symmetry: Symmetry, most: int) -> Setting:
     problem = diagram.problem
-    known, names = problem.parameter_values, tuple(diagram.rates)
+    values, names = problem.parameter_values, tuple(diagram.rates)
     rates = tuple(Fraction(r) for r in diagram.rates.values())
     start = tuple(
-        Fraction(float(next(iter(known[name])))) - rate * Fraction(diagram.value)
+        Fraction(float(next(iter(values[name])))) - rate * Fraction(diagram.value)
         for name, rate in zip(names, rates, strict=True)
     )
     arc = max(diagram.arcs, key=lambda a: len(a.points))
@@ -437,9 +472,12 @@ def _setting(diagram: Diagram, symmetry: Symmetry) -> Setting:
         hessians * np.outer(problem.scales, problem.scales), axis=(1, 2)
     )
     sizes = np.where(np.isfinite(sizes) & (sizes > 0), sizes, 1.0)
-    # Powers of two: functions that a symmetry takes to each other have the same.
-    weights = tuple((0.5 ** np.rint(np.log2(sizes))).tolist())
     lifted = lifted_problem(problem, names)
+    known = images(lifted, symmetry, diagram, most)
+    weights: list[float] = (0.5 ** np.rint(np.log2(sizes))).tolist()
+    # Functions that a symmetry takes to each other have the same.
+    for i, j in [(i, j) for g in known for i, j in enumerate(g.functions) if j >= 0] * len(known):
+        weights[i] = weights[j] = max(weights[i], weights[j])
     low, high = diagram.interval
     return Setting(
         formulas=Formulas(problem.functions, problem.polyhedron.manifold, (*names, PIN)),
@@ -447,7 +485,7 @@ def _setting(diagram: Diagram, symmetry: Symmetry) -> Setting:
         equations=tuple(independent_equations(problem.polyhedron, [q])),
         start=start,
         rates=rates,
-        weights=weights,
+        weights=tuple(weights),
         units=(*problem.scales.tolist(), *((high - low) / 5 * abs(float(r)) for r in rates)),
-        images=tuple(_images(lifted, symmetry, problem.dimension, weights)),
+        images=tuple(known),
     )

@@ -26,6 +26,10 @@ class BranchProofOptions(Checked):
         Largest tube about an event, in units.
     halvings : int
         Of the tube about an event, at most.
+    most_images : int
+        Symmetries that are tried for two arcs at a branch point, at most.
+    inside : float
+        Part of what is shown about a pitchfork, beyond which its arcs have tubes.
     resolution : float
         Largest side, in units, of boxes that are left open.
     max_boxes : int
@@ -46,7 +50,7 @@ class BranchProofOptions(Checked):
     Raises
     ------
     TypeError, ValueError
-        Unless all are positive, ``gain`` is below 1 and ``bits`` at least 53.
+        Unless all are positive, ``gain`` and ``inside`` are below 1 and ``bits`` at least 53.
     """
 
     bits: int = 64
@@ -56,6 +60,8 @@ class BranchProofOptions(Checked):
     near: tuple[float, ...] = (2.0**-30, 2.0**-20, 2.0**-12)
     widest: float = 1.0
     halvings: int = 20
+    most_images: int = 256
+    inside: float = 0.5
     resolution: float = 1e-4
     max_boxes: int = 200_000
     max_seconds: float = 600.0
@@ -77,3 +83,4 @@ class BranchProofOptions(Checked):
             else:
                 checks.real(name, value, above=0, infinite=name == "max_seconds")
         checks.real("gain", self.gain, below=1)
+        checks.real("inside", self.inside, below=1)

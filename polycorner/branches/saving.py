@@ -22,9 +22,10 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.branches.diagram import Diagram
+from polycorner.branches.mirrors import Image
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
-from polycorner.branches.tubes import Image, Setting
+from polycorner.branches.tubes import Setting
 from polycorner.intervals.balls import ball, precision
 from polycorner.intervals.enclosures import Formulas
 from polycorner.progress import Progress

@@ -14,12 +14,13 @@ points at which gradients become dependent are nothing special.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner.branches.mirrors import Image, Mirror
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.intervals.balls import (
@@ -37,6 +38,7 @@ from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import (
     Cell,
     Enclosure,
+    Equations,
     Linearisation,
     defect,
     enclose,
@@ -50,23 +52,6 @@ if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
 PIN = "the pin of a tube"  # the last input, which no formula reads
-
-
-@dataclass(frozen=True)
-class Image:
-    """A symmetry ``g``: a signed permutation of coordinates that keeps energy and parameters.
-
-    Attributes
-    ----------
-    order, signs : tuple of int
-        ``(g q)_i = signs_i q_{order_i}``.
-    functions : tuple of int
-        ``f_i(g q) = f_{functions_i}(q)``; these have equal weights.
-    """
-
-    order: tuple[int, ...]
-    signs: tuple[int, ...]
-    functions: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +120,8 @@ class CurveSystem:
         ``c`` and ``a``.
     gap : int
         A function that vanishes in place of the pin; -1 for none.
+    mirror : Mirror, optional
+        The odd equations, which hold wherever the odd unknowns vanish, are replaced by these.
     """
 
     setting: Setting
@@ -142,6 +129,7 @@ class CurveSystem:
     normal: "tuple[Ball, ...]" = ()
     anchor: "tuple[Ball, ...]" = ()
     gap: int = -1
+    mirror: Mirror | None = None
 
     @property
     def dimension(self) -> int:
@@ -205,8 +193,11 @@ class CurveSystem:
             [*[zero] * d, *counted],
             pin,
         ]
+        residual = [*slope, *values[:k], *line, dot(counted, mu) - 1, left]
+        if self.mirror is not None:
+            residual, jacobian = self._even(self.mirror, z, residual, jacobian)
         return Linearisation(
-            residual=[*slope, *values[:k], *line, dot(counted, mu) - 1, left],
+            residual=residual,
             jacobian=jacobian,
             drift=[*([zero] for _ in jacobian[1:]), [ball(-1)]],
             energy=values[k],
@@ -215,24 +206,75 @@ class CurveSystem:
             forms=forms,
         )
 
+    @staticmethod
+    def _even(
+        mirror: Mirror, z: "Sequence[Ball]", left: "list[Ball]", rows: "list[list[Ball]]"
+    ) -> "tuple[list[Ball], list[list[Ball]]]":
+        """Return even equations, and odd unknowns in place of the odd ones."""
+        left, odd = mirror.sides(left), mirror.parts(z)
+        rows = [list(row) for row in zip(*map(mirror.sides, zip(*rows, strict=True)), strict=True)]
+        for (i, j, s), (_, row, _) in zip(mirror.unknowns, mirror.equations, strict=True):
+            left[row], rows[row] = odd[j], [ball(0)] * len(z)
+            rows[row][j] = ball(1)
+            if i != j:
+                rows[row][i], rows[row][j] = ball(0.5), ball(-s) / 2
+        return left, rows
+
+    def turned(
+        self, z: "Sequence[Ball]", along: "Sequence[Ball]", box: Box
+    ) -> "list[list[Ball]] | Undecided":
+        """Return the second derivatives of the equations, one of them along a vector.
+
+        The slopes of the box are ``along``.
+        """
+        d, n, k = self.dimension, self.setting.n, len(self.rows) - 1
+        forms = self.setting.formulas.smooth(box, self.rows)
+        if isinstance(forms, Undecided):
+            return forms
+        (_, _, hessians), (_, slopes, bent) = forms.slopes(box)
+        weights, growth = self._signed_weights(z[d:]), self._signed_weights(along[d:])
+        signed = self._signed([[x[0] for x in g] for g in slopes])
+        rows = [
+            [dot(weights, [h[a][j][0] for h in bent]) + dot(growth, [h[a][j] for h in hessians])
+             for j in range(d)] + [row[a] for row in signed]
+            for a in range(n)
+        ]  # fmt: skip
+        none = [ball(0)] * len(self.rows)
+        rows += [[*(x[0] for x in g[:d]), *none] for g in slopes[:k]]
+        return rows + [[ball(0)] * self.size for _ in range(self.size - len(rows))]
+
+    def third(
+        self, z: "Sequence[Ball]", along: "Sequence[Ball]", box: Box
+    ) -> "list[Ball] | Undecided":
+        """Return the third derivative of the equations along a vector that keeps the parameters."""
+        d, n, k = self.dimension, self.setting.n, len(self.rows) - 1
+        forms = self.setting.formulas.smooth(box, self.rows)
+        if isinstance(forms, Undecided):
+            return forms
+        _, (_, _, bent, last) = forms.slopes(box, 3)
+        weights, growth = self._signed_weights(z[d:]), self._signed_weights(along[d:])
+        v = along[:n]
+        twice = [[dot([x[0] for x in row[:n]], v) for row in h] for h in bent]
+        thrice = [[dot([dot([x[0] for x in r], v) for r in rows], v) for rows in h] for h in last]
+        found = [dot(weights, [g[a] for g in thrice]) + 3 * dot(growth, [g[a] for g in twice])
+                 for a in range(n)]  # fmt: skip
+        found += [dot(g, v) for g in twice[:k]]
+        return found + [ball(0)] * (self.size - len(found))
+
     def second(
         self, z: "Sequence[Ball]", tangents: "Sequence[Sequence[Ball]]", box: Box
     ) -> "list[Ball] | Undecided":
         """Return the second derivative of the equations along ``tangents``, ``F''(x', x')``."""
-        setting, d, n = self.setting, self.dimension, self.setting.n
-        forms = setting.formulas.smooth(box, self.rows)
-        if isinstance(forms, Undecided):
-            return forms
-        turned, bent = forms.slopes(box)
-        k, along = len(self.rows) - 1, [row[0] for row in tangents]
-        weights, growth = self._signed_weights(z[d:]), self._signed_weights(along[d:])
-        total = [
-            dot(weights, [dot([x[0] for x in h[a][:d]], along[:d]) for h in bent])
-            + 2 * dot(growth, [g[a][0] for g in turned])
-            for a in range(n)
-        ]
-        total += [dot([x[0] for x in g[:d]], along[:d]) for g in turned[:k]]
-        return total + [ball(0)] * (self.size - len(total))
+        along = [row[0] for row in tangents]
+        rows = self.turned(z, along, box)
+        if isinstance(rows, Undecided):
+            return rows
+        found = [dot(row, along) for row in rows]
+        if self.mirror is not None:
+            found = self.mirror.sides(found)
+            for row in self.mirror.odd_equations:
+                found[row] = ball(0)
+        return found
 
     def bend(
         self, z: "Sequence[Ball]", tangents: "Sequence[Sequence[Ball]]", box: Box
@@ -267,7 +309,7 @@ class CurveSystem:
     def pinned(self, normal: Sequence[Any], anchor: Sequence[Any]) -> "CurveSystem":
         """Return the same equations with another pin."""
         pin, at = (tuple([ball(x) for x in some]) for some in (normal, anchor))
-        return CurveSystem(self.setting, self.face, pin, at)
+        return replace(self, normal=pin, anchor=at)
 
     def coordinate(self, place: int, value: Any = 0) -> "CurveSystem":
         """Return the same equations with one unknown at a value."""
@@ -415,7 +457,7 @@ def tube_about(system: CurveSystem, middle: Array, reach: float, bits: int) -> T
     return found if isinstance(found, Undecided) else Tube(found)
 
 
-def point(system: CurveSystem, near: "Sequence[Ball]", bits: int) -> Enclosure | Undecided:
+def point(system: Equations, near: "Sequence[Ball]", bits: int) -> Enclosure | Undecided:
     """Return the enclosure of the point that a pin or a gap selects.
 
     With twice the digits, so that it is narrow beside the tubes that have to contain it.

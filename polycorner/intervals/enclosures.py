@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.families import Family
@@ -246,6 +247,9 @@ class SmoothForms:
                     for i in range(n)
                     for j in range(self.inputs)
                 ]
+            if order >= 3:
+                sorts = [sorted(ijk) for ijk in product(range(n), repeat=3)]
+                wanted += [d(d(d(f, i), j), k) for f in self.outputs for i, j, k in sorts]
             self._tapes[order] = Tape(self.graph, wanted)
         return self._tapes[order]
 
@@ -253,22 +257,24 @@ class SmoothForms:
         """Return enclosures up to an order, for ``m`` functions of ``n`` coordinates.
 
         Values ``[m]``; gradients ``[m][inputs]``; second derivatives ``[m][n][inputs]``, the
-        first by a coordinate, the second by any input.
+        first by a coordinate, the second by any input; third ones by coordinates ``[m][n][n][n]``.
         """
         tape = self._tape(order)
         found = tape.run(box)
         return self._shaped([found[slot] for slot in tape.outputs], order)
 
-    def slopes(self, box: Box) -> tuple[Any, Any]:
-        """Return the derivatives of gradients and Hessians along a box with slopes.
+    def slopes(self, box: Box, order: int = 2) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+        """Return what :meth:`evaluate` does on a box with slopes, and derivatives along these.
 
-        Enclosures of their derivatives along each component of ``delta``: of the gradients
-        ``[m][inputs][delta]`` and of the second derivatives ``[m][n][inputs][delta]``.
+        The second result has enclosures of the derivatives along each component of ``delta``, in
+        the same shapes with ``[delta]`` added.
         """
-        tape, nothing = self._tape(2), [constant(Fraction(0))] * len(box.reach)
-        _, along = tape.moving(box)
-        _, turned, bent = self._shaped([along[slot] or nothing for slot in tape.outputs], 2)
-        return turned, bent
+        tape, nothing = self._tape(order), [constant(Fraction(0))] * len(box.reach)
+        values, along = tape.moving(box)
+        return (
+            self._shaped([values[slot] for slot in tape.outputs], order),
+            self._shaped([along[slot] or nothing for slot in tape.outputs], order),
+        )
 
     def _shaped(self, flat: list[Any], order: int) -> tuple[Any, ...]:
         m, n, k = len(self.outputs), self.dimension, self.inputs
@@ -276,7 +282,9 @@ class SmoothForms:
         if order >= 1:
             result.append(_cut(flat[m : m + m * k], k))
         if order >= 2:
-            result.append(_cut(_cut(flat[m + m * k :], k), n))
+            result.append(_cut(_cut(flat[m + m * k :][: m * n * k], k), n))
+        if order >= 3:
+            result.append(_cut(_cut(_cut(flat[m + m * k + m * n * k :], n), n), n))
         return tuple(result)
 
 

@@ -198,7 +198,7 @@ class KKTSystem:
         forms = self._smooth(box)
         if isinstance(forms, Undecided):
             return forms
-        turned, bent = forms.slopes(box)
+        _, (_, turned, bent) = forms.slopes(box)
         weights = [*(-lam for lam in z[n : n + k]), ball(1)]
         growth = [*([-t for t in row] for row in tangents[n : n + k]), [ball(0)] * count]
         total = [ball(0)] * self.size

@@ -19,7 +19,7 @@ from tests.branches.test_normal_forms import CASES, diagram
 t = sympy.Symbol("t")
 M1 = Manifold.euclidean("x")
 (x1,) = M1.symbols
-CROSSINGS = {"pitchfork", "transcritical"}
+CROSSINGS = {"transcritical"}
 BOX = [(-3, 3), (-3, 3)]
 BRIEF = BranchProofOptions(max_boxes=300)
 

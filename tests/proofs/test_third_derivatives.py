@@ -1,4 +1,4 @@
-"""Third derivatives of the checker of saved proofs, against SymPy's of the same formulas."""
+"""Third and fourth derivatives of the checker of saved proofs, against SymPy's."""
 
 import flint
 import pytest
@@ -39,8 +39,12 @@ def cases():
     yield "max", [*inner, ["max", 10, 11]], x + t
 
 
+def along_it(formula):
+    return sum(w * sympy.diff(formula, c) for w, c in zip(ALONG, (x, y, t), strict=True))
+
+
 @pytest.mark.parametrize("case", list(cases()), ids=lambda case: case[0])
-def test_third_derivatives(case):
+def test_third_and_fourth_derivatives(case):
     _, nodes, formula = case
     data = {
         "coordinates": ["x", "y", "t"], "periods": [None] * 3, "functions": ["E"],
@@ -53,16 +57,15 @@ def test_third_derivatives(case):
         family = StoredFamily(StoredProgram(data), data)
         box = [arb(flint.fmpq(int(AT[z].p), int(AT[z].q))) for z in (x, y, t)]
         along = [arb(flint.fmpq(int(z.p), int(z.q))) for z in ALONG]
-        (hessian,), (turned,) = family.bends(box, [0], along)
+        (hessian,), (turned,), (twice,) = family.bends(box, [0], along, 2)
         for i, a in enumerate((x, y, t)):
-            for j, b in enumerate((x, y, t)):
+            for j, b in enumerate((x, y, t)[: i + 1]):
                 second = sympy.diff(formula, a, b)
-                third = sum(
-                    w * sympy.diff(second, c) for w, c in zip(ALONG, (x, y, t), strict=True)
-                )
-                for exact, found in ((second, hessian), (third, turned)):
+                third, fourth = along_it(second), along_it(along_it(second))
+                for exact, found in ((second, hessian), (third, turned), (fourth, twice)):
                     value = arb(str(sympy.N(exact.subs(AT), 50))) + arb(0, 1e-40)
-                    assert found.get((i, j), arb(0)).overlaps(value)
-                    assert found.get((i, j), arb(0)).rad() < 1e-30
+                    for entry in ((i, j), (j, i)):
+                        assert found.get(entry, arb(0)).overlaps(value)
+                        assert found.get(entry, arb(0)).rad() < 1e-30
     finally:
         flint.ctx.prec = before

@@ -62,23 +62,31 @@ class StoredFamily:
             found.append((value, *form))
         return v, memo, found
 
-    def bends(self, box: Sequence[arb], rows: Sequence[int], along: Sequence[arb]) -> Any:
-        """Return Hessians of some functions and their derivatives along a direction."""
+    def bends(
+        self, box: Sequence[arb], rows: Sequence[int], along: Sequence[arb], order: int = 1
+    ) -> list[list[dict[tuple[int, int], Any]]]:
+        """Return Hessians of some functions, and their derivatives along a direction."""
         v, memo, found = self.forms(box, rows)
-        jets = list(v)
+        jets: list[Any] = list(v)
         for a, form in memo.items():
             if form is not None and isinstance(v[a], arb):
                 slope = sum((x * along[i] for i, x in form[0].items()), ZERO)
                 jets[a] = Jet(v[a], slope)
-        changes, turned = dict[int, Any](), []
+                if order > 1:
+                    bent = (x * along[i] * along[j] for (i, j), x in form[1].items())
+                    jets[a] = Jet(jets[a], Jet(slope, sum(bent, ZERO)))
+        changes, turned = dict[int, Any](), [[hessian for _, _, hessian in found]]
+        some: Any
         for row in rows:
-            form = self.p.forms(jets, row, changes, 2) or ({}, {})
-            slopes = {ij: x.slope for ij, x in form[1].items() if isinstance(x, Jet)}
-            need(
-                all(x.is_finite() for x in slopes.values()), "a function is not shown to be smooth"
-            )
-            turned.append(slopes)
-        return [hessian for _, _, hessian in found], turned
+            self.p.forms(jets, row, changes, 2)
+        forms: Any = [changes.get(self.p.outputs[row]) or ({}, {}) for row in rows]
+        some = [{ij: x for ij, x in form[1].items() if isinstance(x, Jet)} for form in forms]
+        for _ in range(order):
+            some = [{ij: x.slope for ij, x in h.items() if isinstance(x, Jet)} for h in some]
+            turned.append([{ij: first(x) for ij, x in h.items()} for h in some])
+        fine = all(x.is_finite() for hessians in turned for h in hessians for x in h.values())
+        need(fine, "a function is not shown to be smooth")
+        return turned
 
 
 class StoredFace:
@@ -119,21 +127,41 @@ class StoredFace:
             [*jacobian, [*[ZERO] * d, *self.counted]],
         )
 
-    def second(self, x: Sequence[arb], v: Sequence[arb]) -> list[arb]:
-        """Return the second derivative of the equations along ``v``, and 0 for the pin."""
+    def turned(self, x: Sequence[arb], v: Sequence[arb]) -> list[list[arb]]:
+        """Return the second derivatives of the equations, one of them along ``v``."""
         n, d = self.n, self.d
         hessians, turned = self.family.bends(x[:d], self.rows, v[:d])
-        total = [ZERO] * n
+        bent, slopes = [ZERO] * n * d, list[list[arb]]()
         for s, m, dm, h, th in zip(self.signed, x[d:], v[d:], hessians, turned, strict=True):
+            slope = [ZERO] * d
             for (i, j), y in h.items():
+                slope[i] += s * y * v[j]
                 if i < n:
-                    total[i] += 2 * s * dm * y * v[j]
+                    bent[i * d + j] += s * dm * y
             for (i, j), y in th.items():
                 if i < n:
-                    total[i] += s * m * y * v[j]
-        for s, h in zip(self.signed[:-1], hessians, strict=False):
-            total.append(s * sum((y * v[i] * v[j] for (i, j), y in h.items()), ZERO))
-        return [*total, ZERO, ZERO]
+                    bent[i * d + j] += s * m * y
+            slopes.append(slope)
+        rows = [[*bent[i * d : i * d + d], *(row[i] for row in slopes)] for i in range(n)]
+        rows += [[*row, *[ZERO] * len(self.rows)] for row in slopes[:-1]]
+        return [*rows, [ZERO] * self.size]
+
+    def second(self, x: Sequence[arb], v: Sequence[arb]) -> list[arb]:
+        """Return the second derivative of the equations along ``v``, and 0 for the pin."""
+        return [*(dot(row, v) for row in self.turned(x, v)), ZERO]
+
+    def third(self, x: Sequence[arb], v: Sequence[arb]) -> list[arb]:
+        """Return the third derivative of the equations along ``v``, which keeps the parameter."""
+        n, d = self.n, self.d
+        _, turned, twice = self.family.bends(x[:d], self.rows, v[:d], 2)
+        total, lengths = [ZERO] * n, list[arb]()
+        for s, m, dm, h, th in zip(self.signed, x[d:], v[d:], turned, twice, strict=True):
+            lengths.append(s * sum((y * v[i] * v[j] for (i, j), y in h.items()), ZERO))
+            for part, weight in ((h, 3 * s * dm), (th, s * m)):
+                for (i, j), y in part.items():
+                    if i < n:
+                        total[i] += weight * y * v[j]
+        return [*total, *lengths[:-1], ZERO]
 
     def pinned(self, normal: Sequence[arb], anchor: Sequence[arb]) -> Equations:
         """Return the equations with a pin."""
@@ -168,6 +196,11 @@ class StoredFace:
         normal = [y / u**2 for y, u in zip(along, self.units, strict=True)]
         _, jacobian = self.at(x)
         return solved([*jacobian, normal], [*[ZERO] * (self.size - 1), arb(1)])
+
+
+def first(x: Any) -> arb:
+    """Return the number that a jet is at the point itself."""
+    return first(x.value) if isinstance(x, Jet) else x
 
 
 def solved(rows: list[list[arb]], right: Sequence[arb]) -> list[arb]:

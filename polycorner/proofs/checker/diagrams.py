@@ -13,8 +13,8 @@ that is verified this is true, of the functions and the interval that it states:
    interval, all equilibria are on the arcs of the file that end there, or the point itself. At a
    *fold* two arcs of one face meet on one side, at a *corner limit* two of different faces; where
    a contact *opens* or *closes*, or one is *exchanged* for another, one arc ends and one begins;
-   at a *branch* more than two arcs meet; at *dependent* gradients, or where the set *vanishes*
-   but for the point, one arc ends, as it does at an *end* of the interval.
+   at a *branch* more than two arcs meet, as the four of a pitchfork; at *dependent* gradients, or
+   where the set *vanishes* but for the point, one arc ends, as it does at an *end* of the interval.
 3. If a box is stated, all equilibria in it, for all ``t`` of the interval, are on arcs or at
    events.
 
@@ -125,9 +125,10 @@ class StoredDiagram(StoredProof):
                 shift = StoredSymmetry(p, whole, none, algebra, f"period of {name}")
                 need(shift.proved, f"the period of {name} is not shown by algebra")
         self.faces = dict[tuple[int, ...], StoredFace]()
-        self.tubes = dict[tuple[int, ...], list[tuple[Tube, list[float], list[float]]]]()
+        self.tubes = dict[tuple[int, ...], list[tuple[Any, list[float], list[float]]]]()
         about = (self.about(*curve) for event in self.events for curve in event.curves)
-        for tube in (*(tube for arc in self.arcs for tube in arc.tubes), *about):
+        forks = (event.pitchfork for event in self.events)
+        for tube in (*(tube for arc in self.arcs for tube in arc.tubes), *about, *forks):
             if tube is not None:
                 pairs = list(zip(tube.x, self.family.scales, strict=False))
                 # a tube is tried for boxes that are not farther from it than it is long
@@ -209,7 +210,8 @@ class StoredDiagram(StoredProof):
         near = sorted(self.near(active, box), key=lambda found: found[0]) if mu else []
         if not near:
             return False
-        left = near[0][1].narrowed([*near[0][2], *(mu or ())], NARROWINGS)
+        _, tube, x, *_ = next((some for some in near if isinstance(some[1], Tube)), near[0])
+        left = tube.narrowed([*x, *(mu or ())], NARROWINGS)
         return not left or any(
             tube.covers([*self.turned(left, lower, upper), *left[self.p.n :]])
             for _, tube, _, lower, upper in near

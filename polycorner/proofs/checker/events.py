@@ -36,6 +36,7 @@ from .algebra import total
 from .arcs import StoredArc, Watched
 from .balls import ZERO, NotShownError, dot, need, negatives, places
 from .curves import StoredFace, StoredFamily, Tube, solved
+from .pitchforks import StoredPitchfork
 from .statement import zero_near
 from .symmetries import TurnedAlgebra
 
@@ -55,6 +56,7 @@ class StoredEvent:
         self.family, self.ends, self.images = family, list(ends), images
         self.watched = w = Watched(family)
         self.curves: list[tuple[StoredFace, list[arb], list[arb]]] = []
+        self.pitchfork: StoredPitchfork | None = None
         zeros = frozenset[int]().union(*(arc.zeros[side] for arc, side in ends))
         try:
             if zeros in ({w.start}, {w.end}):
@@ -63,8 +65,10 @@ class StoredEvent:
                 self.x, self.kind = self.fold()
             elif zeros == {w.energy, w.turn}:
                 self.x, self.kind = self.dependent()
+            elif not zeros:
+                self.x, self.kind = self.branch()
             else:
-                need(zeros and max(zeros) < w.m, "this checker does not know such an event")
+                need(max(zeros) < w.m, "this checker does not know such an event")
                 self.x, self.kind = self.contacts(sorted(zeros))
             t = self.x[family.n]
             inside = zeros in ({w.start}, {w.end}) or (t > w.low and t < w.high)
@@ -127,6 +131,24 @@ class StoredEvent:
                 continue
             return tube
         raise NotShownError(reason)
+
+    # -------------------------------------------------------------------------------- pitchforks
+
+    def branch(self) -> tuple[list[arb], str]:
+        """Show a branch point by one of the symmetries."""
+        faces = {arc.face.active for arc, _ in self.ends}
+        need(
+            len(self.ends) == 4 and len(faces) == 1, "four arcs of one face meet at a branch point"
+        )
+        reason = NotShownError("no symmetry is given for a branch point")
+        for g in self.images:
+            try:
+                self.pitchfork = StoredPitchfork(self.ends, g)
+            except NotShownError as error:
+                reason = error
+            else:
+                return self.pitchfork.centre[: self.family.p.n], "branch"
+        raise reason
 
     # -------------------------------------------------------------------------- dependent gradients
 
@@ -316,7 +338,8 @@ class StoredEvent:
 class StoredImage:
     """A symmetry of a file: a signed permutation of coordinates that keeps energy and parameter.
 
-    ``(g q)_i = signs_i q_{order_i}`` and ``f_i(g q) = f_{functions_i}(q)``, shown by algebra.
+    ``(g q)_i = signs_i q_{order_i}`` and ``f_i(g q) = f_{functions_i}(q)``, shown by algebra; of
+    functions with the number -1 nothing is shown.
     """
 
     def __init__(
@@ -326,13 +349,16 @@ class StoredImage:
         need(p.k == 0, "a symmetry is given, and equations")
         self.order = [*places(record["order"], n, "a symmetry"), n]
         self.signs = [*record["signs"], 1]
-        self.functions = places(record["functions"], p.m, "a symmetry")
-        fine = sorted(self.order) == [*range(p.n)] and sorted(self.functions) == [*range(p.m)]
+        self.functions = list(record["functions"])
+        taken = places([k for k in self.functions if k != -1], p.m, "a symmetry")
+        fine = sorted(self.order) == [*range(p.n)] and len(self.functions) == p.m
+        fine &= len({*taken}) == len(taken)
         fine &= all(type(s) is int and abs(s) == 1 for s in self.signs)
         need(fine and len(self.signs) == p.n, "a symmetry")
         self.periods, self.turns = [None] * p.n, ["0"] * p.n
         moved = algebra.at(self)
-        for row, kept in enumerate([*self.functions, family.energy]):
+        pairs = enumerate([*self.functions, family.energy])
+        for row, kept in (pair for pair in pairs if pair[1] >= 0):
             one, two = moved.value(p.outputs[row]), algebra.value(p.outputs[kept])
             known = isinstance(one, dict) and isinstance(two, dict)
             need(known and one == total({}, two), "a symmetry is not shown by algebra")

@@ -7,15 +7,18 @@ from flint import arb
 from .balls import NAN, ZERO
 
 
-def parts(x: Any) -> tuple[arb, arb]:
+def parts(x: Any) -> tuple[Any, Any]:
     """Return value and derivative of a jet, or of a number that does not change."""
     return (x.value, x.slope) if isinstance(x, Jet) else (arb(x), ZERO)
 
 
 class Jet:
-    """A value on a box and its derivative along a direction, ``x + x' d`` with ``d^2 = 0``."""
+    """A value on a box and its derivative along a direction, ``x + x' d`` with ``d^2 = 0``.
 
-    def __init__(self, value: arb, slope: arb) -> None:
+    Both may be jets themselves, of which the slopes of slopes are second derivatives.
+    """
+
+    def __init__(self, value: Any, slope: Any) -> None:
         self.value, self.slope = value, slope
 
     # --------------------------------------------------------------------------------- comparisons

@@ -135,6 +135,20 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     equation may change its sign.  ``f_i(g q) = f_{p(i)}(q)``.  None where expanding the formulas
     does not show this.
     """
+    names, d = functions_moved(problem, g), problem.polyhedron
+    if names is None or -1 in names:
+        return None
+    # The tree counts, too: the same functions may be joined by and, or by or.
+    pieces = set(d.signs_to_pieces([0] * len(names)))
+    return names if {frozenset(names[i] for i in piece) for piece in pieces} == pieces else None
+
+
+def functions_moved(problem: Problem, g: Motion) -> tuple[int, ...] | None:
+    """Return where a motion that keeps energy and equations takes each inequality.
+
+    ``f_i(g q) = f_{p(i)}(q)``, and ``p(i) = -1`` if that is not shown to be a function of the set.
+    None where expanding the formulas does not show that energy and equations are kept.
+    """
     import sympy
 
     d = problem.polyhedron
@@ -143,7 +157,6 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     for k, symbol in enumerate(symbols):
         shift = g.halves[k] * _exact_half(d.manifold.periods[k])
         moved[symbol] = g.signs[k] * symbols[g.order[k]] + shift
-    names = {}
     before = _normal_forms(problem)
     after = {f: _normal(_bound(f).xreplace(moved)) for f in problem.functions}
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
@@ -153,16 +166,8 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
         pairs = product(d.equations, (1, -1))
         if not any(sympy.expand(after[h] - s * before[k]) == 0 for k, s in pairs):
             return None
-    for i, f in enumerate(d.functions):
-        images = [j for j, k in enumerate(d.functions) if before[k] == after[f]]
-        if not images:
-            return None
-        names[i] = images[0]
-    # The tree counts, too: the same functions may be joined by and, or by or.
-    pieces = set(d.signs_to_pieces([0] * len(d.functions)))
-    if {frozenset(names[i] for i in piece) for piece in pieces} != pieces:
-        return None
-    return tuple(names[i] for i in range(len(d.functions)))
+    images = ([j for j, k in enumerate(d.functions) if before[k] == after[f]] for f in d.functions)
+    return tuple([found[0] if found else -1 for found in images])
 
 
 def expanded(f: SmoothFunction) -> "sympy.Expr":
