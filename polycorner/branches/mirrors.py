@@ -39,11 +39,14 @@ class Image:
     functions : tuple of int
         ``f_i(g q) = f_{functions_i}(q)``; these have equal weights.  -1 where ``g`` takes a
         function to none of the set.
+    equations : tuple of (int, int)
+        ``h_j(g q) = s h_k(q)`` for the pairs ``(k, s)``; of ``h_j`` and ``h_k`` weights are equal.
     """
 
     order: tuple[int, ...]
     signs: tuple[int, ...]
     functions: tuple[int, ...]
+    equations: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,10 @@ class Mirror:
     equations: tuple[tuple[int, int, int], ...]
 
     @classmethod
-    def of(cls, g: Image, face: Face, dimension: int) -> "Mirror | None":
-        """Return what an image is on a face without equations of the set; None for no involution.
+    def of(
+        cls, g: Image, face: Face, dimension: int, equations: Sequence[int] = ()
+    ) -> "Mirror | None":
+        """Return what an image is on a face; None unless it is an involution there.
 
         Parameters
         ----------
@@ -70,12 +75,16 @@ class Mirror:
         face : tuple of int
         dimension : int
             Of coordinates and parameters, which come before the multipliers.
+        equations : sequence of int
+            Numbers of the equations that are held.
         """
         n, moved = len(g.order), [g.functions[i] for i in face]
-        if set(moved) != set(face):
+        turned = [g.equations[j] for j in equations]
+        if set(moved) != set(face) or {k for k, _ in turned} != set(equations):
             return None
-        order = [*g.order, *(n + face.index(i) for i in moved)]
-        signs = [*g.signs, *[1] * len(face)]
+        places = {j: n + len(face) + k for k, j in enumerate(equations)}
+        order = [*g.order, *(n + face.index(i) for i in moved), *(places[k] for k, _ in turned)]
+        signs = [*g.signs, *[1] * len(face), *(s for _, s in turned)]
         if not all(order[j] == i and signs[i] == signs[j] for i, j in enumerate(order)):
             return None
         pairs = [(i, j, s) for i, (j, s) in enumerate(zip(order, signs, strict=True))
@@ -157,23 +166,23 @@ def images(lifted: Problem, symmetry: Symmetry, diagram: Diagram, most: int) -> 
         If elements of the symmetry are no signed permutations, or not shown to be symmetries.
     """
     manifold, n = lifted.polyhedron.manifold, diagram.problem.dimension
-    kept, found = tuple(range(n, manifold.size)), dict[Motion, tuple[int, ...] | None]()
+    kept, found = tuple(range(n, manifold.size)), dict[Motion, Any]()
     for element in symmetry.elements:
 
         def carried(q: Array, apply: Any = element.apply) -> Array:
             return np.concatenate([np.asarray(apply(q[:n])), q[n:]])
 
         g = motion(manifold, carried, "symmetry")
-        found[g] = permutation(lifted, g)
-        if found[g] is None:
+        found[g] = functions_moved(lifted, g)
+        if permutation(lifted, g) is None:
             checks.refuse("symmetry", "elements that expanded formulas show to be symmetries", g)
     for order, signs in _exchanges(diagram, most):
         g = Motion((*order, *kept), (*signs, *[1] * len(kept)), (0,) * manifold.size)
         if g not in found:
             found[g] = functions_moved(lifted, g)
     return [
-        Image(g.order[:n], g.signs[:n], functions)
-        for g, functions in found.items() if functions is not None and not any(g.halves)
+        Image(g.order[:n], g.signs[:n], *moved)
+        for g, moved in found.items() if moved is not None and not any(g.halves)
     ]  # fmt: skip
 
 

@@ -301,10 +301,11 @@ def pitchfork(
     options: BranchProofOptions,
 ) -> Pitchfork | Undecided:
     """Return the pitchfork of a symmetry at an approximate point, with points on its curves."""
-    mirror = Mirror.of(g, face, len(setting.units))
     subject = "the branch point"
-    if mirror is None or setting.equations:
-        return Undecided(subject, "the symmetry is no involution of its face without equations")
+    held = [row - setting.inequalities for row in setting.equations]
+    mirror = Mirror.of(g, face, len(setting.units), held)
+    if mirror is None:
+        return Undecided(subject, "no symmetry that is an involution keeps its active functions")
     system = CurveSystem(setting, face).coordinate(0)
     y, apart = mirror.parts(_balls(at)), [mirror.parts(_balls(x)) for x in near]
     sizes = [(abs(float(off[j].mid())) / system.units[j], j, k)

@@ -476,7 +476,10 @@ def _setting(diagram: Diagram, symmetry: Symmetry, most: int) -> Setting:
     known = images(lifted, symmetry, diagram, most)
     weights: list[float] = (0.5 ** np.rint(np.log2(sizes))).tolist()
     # Functions that a symmetry takes to each other have the same.
-    for i, j in [(i, j) for g in known for i, j in enumerate(g.functions) if j >= 0] * len(known):
+    m = problem.inequalities
+    pairs = [(i, j) for g in known for i, j in enumerate(g.functions) if j >= 0]
+    pairs += [(m + i, m + j) for g in known for i, (j, _) in enumerate(g.equations)]
+    for i, j in pairs * len(known):
         weights[i] = weights[j] = max(weights[i], weights[j])
     low, high = diagram.interval
     return Setting(

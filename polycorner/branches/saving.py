@@ -152,7 +152,12 @@ def _described(diagram: Diagram, evidence: Evidence) -> dict[str, Any]:
         "weights": texts(Fraction(w) for w in evidence.weights),
         "scales": texts(Fraction(u) for u in (*evidence.units[:n], (high - low) / 5)),
         "symmetries": [
-            {"order": list(g.order), "signs": list(g.signs), "functions": list(g.functions)}
+            {
+                "order": list(g.order),
+                "signs": list(g.signs),
+                "functions": list(g.functions),
+                "equations": [list(pair) for pair in g.equations],
+            }
             for g in evidence.images
         ],
     }

@@ -107,10 +107,42 @@ def swapped(sign):
     u, v = x - y, x + y
     energy = sign * (u**4 / 4 - t * u**2 / 2) + v**2 / 2 + v * t / 3 + u**2 * v / 20
     d, energy = posed(PLANE, {"far": v + 10}, energy, -0.5)
-    return branches(stationary_on(d, energy, [0.08, 0.08], ()), "t", (-0.75, 0.5))
+    return branches(stationary_on(d, energy, [0.08, 0.08], ()), "t", (-0.6, 0.1))
 
 
-MADE = {"bar": bar, "groove": groove, "swap": lambda: swapped(1), "unstable": lambda: swapped(-1)}
+def constrained(equations, value):
+    """Return where ``z`` leaves 0 on a curve: at -2 with the first equations, else at -1/2.
+
+    On the curve ``x + y = 2 z^2, x - y = 2 z`` or ``x + y = z^2, x - y = z`` the energy is
+    ``-(t + 2) z^2 / 2 + ...`` or ``-(t + 1/2) z^2 / 2 + ...``.
+    """
+    x, y, z = SPACE.symbols
+    formula = z**4 / 4 - t * z**2 / 2 + x * y + (x + y) ** 2
+    energy = SmoothFunction("energy", formula, SPACE, parameters={"t": value})
+    d = Polyhedron(SPACE, {}, equations)
+    return branches(stationary_on(d, energy, [0, 0, 0], ()), "t", (value, value + 1.5))
+
+
+def exchanged():
+    """Return a curve of two equations that the mirror exchanges."""
+    x, y, z = SPACE.symbols
+    return constrained({"one": x - z - z**2, "two": y + z - z**2}, -3.0)
+
+
+def turned():
+    """Return a curve of two equations, of which the mirror changes the sign of one."""
+    x, y, z = SPACE.symbols
+    return constrained({"odd": x - y - z, "even": x + y - z**2}, -1.0)
+
+
+MADE = {
+    "exchanged": exchanged,
+    "turned": turned,
+    "bar": bar,
+    "groove": groove,
+    "swap": lambda: swapped(1),
+    "unstable": lambda: swapped(-1),
+}
 
 
 @pytest.mark.parametrize("name", MADE)
@@ -118,7 +150,7 @@ def test_symmetries_are_found_and_pitchforks_verified(name, tmp_path):
     proof = prove_branches(MADE[name]())
     assert proof.proved
     ((low, high),) = bounds(proof)
-    exact = {"bar": 1.0, "groove": 0.0}
+    exact = {"bar": 1.0, "groove": 0.0, "exchanged": -2.0, "turned": -0.5}
     assert low - 1e-15 <= exact.get(name, low) <= high + 1e-15
     fine, line = verdict(proof.save(tmp_path / "proof.zip"))
     assert fine, line
@@ -171,7 +203,7 @@ def test_an_arm_instead_of_the_other_is_not_proved():
 def test_forged_symmetries_and_arms_are_refused(tmp_path):
     path = prove_branches(bar()).save(tmp_path / "bar.zip")
     data, parts = described(path), parts_of(path)
-    mirror = {"order": [0], "signs": [-1], "functions": [-1, -1]}
+    mirror = {"order": [0], "signs": [-1], "functions": [-1, -1], "equations": []}
     assert data["symmetries"] == [mirror]
     for symmetries in (
         [],
@@ -181,6 +213,7 @@ def test_forged_symmetries_and_arms_are_refused(tmp_path):
         [mirror | {"functions": [-1]}],
         [mirror | {"functions": [-2, -1]}],
         [mirror | {"functions": [True, -1]}],
+        [mirror | {"equations": [[0, 1]]}],
     ):
         told = data | {"symmetries": symmetries}
         assert not verdict(rewritten(tmp_path / "forged.zip", parts, told))[0], symmetries
@@ -201,6 +234,16 @@ def test_forged_symmetries_and_arms_are_refused(tmp_path):
     (cosine,) = [k for k, node in enumerate(energy["nodes"]) if node[0] == "cos"]
     energy["nodes"][cosine][0] = "sin"
     assert not verdict(rewritten(tmp_path / "forged.zip", parts, energy))[0]
+
+
+def test_signs_of_equations_are_checked(tmp_path):
+    path = prove_branches(turned()).save(tmp_path / "turned.zip")
+    data, parts = described(path), parts_of(path)
+    (mirror,) = data["symmetries"]
+    assert sorted(mirror["equations"]) == [[0, -1], [1, 1]]
+    for equations in ([], [[0, 1], [1, 1]], [[0, -1]], [[0, -1], [0, -1]], [[1, 1], [0, -1]]):
+        told = data | {"symmetries": [mirror | {"equations": equations}]}
+        assert not verdict(rewritten(tmp_path / "forged.zip", parts, told))[0], equations
 
 
 # ------------------------------------------------------------------------------------ the equations

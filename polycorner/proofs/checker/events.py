@@ -270,6 +270,8 @@ class StoredEvent:
         that is unique nearby: where the image of the point is near, it is the point.
         """
         n, d, full = face.n, face.d, face.active
+        if self.family.p.k:
+            return False
         along = [u * int(i == n) for i, u in enumerate(face.units)]
         about = Tube.about(face, x, along, arb(2) ** -REACHES[1])
         for g in self.images:
@@ -338,30 +340,34 @@ class StoredEvent:
 class StoredImage:
     """A symmetry of a file: a signed permutation of coordinates that keeps energy and parameter.
 
-    ``(g q)_i = signs_i q_{order_i}`` and ``f_i(g q) = f_{functions_i}(q)``, shown by algebra; of
-    functions with the number -1 nothing is shown.
+    ``(g q)_i = signs_i q_{order_i}``, ``f_i(g q) = f_{functions_i}(q)`` and ``h_j(g q) = s h_k(q)``
+    for the pairs ``(k, s)`` of ``equations``, shown by algebra; of functions with the number -1
+    nothing is shown.
     """
 
     def __init__(
         self, family: StoredFamily, record: dict[str, Any], algebra: TurnedAlgebra
     ) -> None:
         p, n = family.p, family.n
-        need(p.k == 0, "a symmetry is given, and equations")
         self.order = [*places(record["order"], n, "a symmetry"), n]
         self.signs = [*record["signs"], 1]
         self.functions = list(record["functions"])
+        self.equations = [tuple(pair) for pair in record.get("equations", [])]
         taken = places([k for k in self.functions if k != -1], p.m, "a symmetry")
+        kept = places([k for k, _ in self.equations], p.k, "a symmetry")
+        signs = [*self.signs, *(s for _, s in self.equations)]
         fine = sorted(self.order) == [*range(p.n)] and len(self.functions) == p.m
-        fine &= len({*taken}) == len(taken)
-        fine &= all(type(s) is int and abs(s) == 1 for s in self.signs)
+        fine &= len({*taken}) == len(taken) and sorted(kept) == [*range(p.k)]
+        fine &= all(type(s) is int and abs(s) == 1 for s in signs)
         need(fine and len(self.signs) == p.n, "a symmetry")
         self.periods, self.turns = [None] * p.n, ["0"] * p.n
         moved = algebra.at(self)
-        pairs = enumerate([*self.functions, family.energy])
-        for row, kept in (pair for pair in pairs if pair[1] >= 0):
-            one, two = moved.value(p.outputs[row]), algebra.value(p.outputs[kept])
+        same = [(row, k, 1) for row, k in enumerate(self.functions) if k >= 0]
+        same += [(p.m + j, p.m + k, s) for j, (k, s) in enumerate(self.equations)]
+        for row, other, sign in (*same, (family.energy, family.energy, 1)):
+            one, two = moved.value(p.outputs[row]), algebra.value(p.outputs[other])
             known = isinstance(one, dict) and isinstance(two, dict)
-            need(known and one == total({}, two), "a symmetry is not shown by algebra")
+            need(known and one == total({}, two, sign), "a symmetry is not shown by algebra")
         algebra.work = moved.work
 
 

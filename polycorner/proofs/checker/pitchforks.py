@@ -61,11 +61,17 @@ class Mirror:
         n, active = face.n, face.active
         moved = [g.functions[i] for i in active]
         need({*moved} == {*active}, "the symmetry does not keep the face of a branch point")
-        weights = face.family.weights
-        same = all(bool(weights[i] == weights[k]) for i, k in zip(active, moved, strict=True))
+        m, weights = face.family.p.m, face.family.weights
+        pairs = [
+            *zip(active, moved, strict=True),
+            *((m + j, m + k) for j, (k, _) in enumerate(g.equations)),
+        ]
+        same = all(bool(weights[i] == weights[k]) for i, k in pairs)
         need(same, "weights of functions that are exchanged differ")
+        past = n + len(active)
         order = [*g.order[:n], *(n + active.index(i) for i in moved)]
-        signs = [*g.signs[:n], *[1] * len(active)]
+        order += [past + k for k, _ in g.equations]
+        signs = [*g.signs[:n], *[1] * len(active), *(s for _, s in g.equations)]
         need(
             all(order[j] == i and signs[i] == signs[j] for i, j in enumerate(order)),
             "the symmetry of a branch point is no involution",
@@ -234,8 +240,8 @@ class StoredPitchfork:
         x = mirror.point(arms, PART * eps)
         v = self.family.p.values(x[: face.d])
         others = (v[self.family.p.outputs[i]] for i in range(w.m) if i not in face.active)
-        t = x[face.n]
-        fine = all(y > 0 for y in (*others, *x[face.d :], t - w.low, w.high - t))
+        t, mu = x[face.n], x[face.d : face.d + len(face.active)]
+        fine = all(y > 0 for y in (*others, *mu, x[-1], t - w.low, w.high - t))
         need(fine, "something may vanish on the arms of a branch point")
         change = [*self.change(arms, eps), ZERO]
         rate = solved(self.derivatives(arms, eps), [-y for y in change])[face.n]

@@ -135,19 +135,23 @@ def permutation(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     equation may change its sign.  ``f_i(g q) = f_{p(i)}(q)``.  None where expanding the formulas
     does not show this.
     """
-    names, d = functions_moved(problem, g), problem.polyhedron
-    if names is None or -1 in names:
+    moved, d = functions_moved(problem, g), problem.polyhedron
+    names = moved[0] if moved else (-1,)
+    if -1 in names:
         return None
     # The tree counts, too: the same functions may be joined by and, or by or.
     pieces = set(d.signs_to_pieces([0] * len(names)))
     return names if {frozenset(names[i] for i in piece) for piece in pieces} == pieces else None
 
 
-def functions_moved(problem: Problem, g: Motion) -> tuple[int, ...] | None:
-    """Return where a motion that keeps energy and equations takes each inequality.
+def functions_moved(
+    problem: Problem, g: Motion
+) -> tuple[tuple[int, ...], tuple[tuple[int, int], ...]] | None:
+    """Return where a motion that keeps energy and equations takes each inequality and equation.
 
-    ``f_i(g q) = f_{p(i)}(q)``, and ``p(i) = -1`` if that is not shown to be a function of the set.
-    None where expanding the formulas does not show that energy and equations are kept.
+    ``f_i(g q) = f_{p(i)}(q)``, and ``p(i) = -1`` if that is not shown to be a function of the set;
+    ``h_j(g q) = s h_k(q)`` for the pairs ``(k, s)``.  None where expanding the formulas does not
+    show that energy and equations are kept.
     """
     import sympy
 
@@ -161,13 +165,16 @@ def functions_moved(problem: Problem, g: Motion) -> tuple[int, ...] | None:
     after = {f: _normal(_bound(f).xreplace(moved)) for f in problem.functions}
     if sympy.expand(before[problem.energy] - after[problem.energy]) != 0:
         return None
+    equations = []
     for h in d.equations:
         # The zero set of -h is that of h, but -f >= 0 is another set than f >= 0.
-        pairs = product(d.equations, (1, -1))
-        if not any(sympy.expand(after[h] - s * before[k]) == 0 for k, s in pairs):
+        pairs = product(enumerate(d.equations), (1, -1))
+        fits = [(k, s) for (k, f), s in pairs if sympy.expand(after[h] - s * before[f]) == 0]
+        if not fits:
             return None
+        equations.append(fits[0])
     images = ([j for j, k in enumerate(d.functions) if before[k] == after[f]] for f in d.functions)
-    return tuple([found[0] if found else -1 for found in images])
+    return tuple([found[0] if found else -1 for found in images]), tuple(equations)
 
 
 def expanded(f: SmoothFunction) -> "sympy.Expr":
