@@ -9,7 +9,8 @@ arcs.  The sum is hidden behind
 - factors of the functions that are positive, and an energy that is scaled and shifted with ``t``;
 - functions, and unions of functions, that do not vanish near the arcs.
 
-None of these changes arcs, active sets, indices or kinds of events.
+None of these changes arcs, active sets, indices or kinds of events.  A symmetry of the form is
+hidden, too, or one of its coordinates stays odd: then its change of sign is one of the energy.
 
 >>> posed = [problem(0, number) for number in range(3 * len(FORMS))]
 >>> len({p.kind for p in posed}) == len(FORMS), sum(len(p.events) for p in posed) > 100
@@ -482,8 +483,13 @@ def connected(form: Form, first: int) -> tuple[list[KnownArc], list[KnownEvent]]
     ]
 
 
-def hidden(kind: str, form: Form, rng: Rng) -> Posed:  # noqa: PLR0915 - one change after the other
-    """Return a form behind changes of coordinates, of the parameter and of units."""
+def hidden(  # noqa: PLR0915 - one change after the other
+    kind: str, form: Form, rng: Rng, odd: int = -1
+) -> Posed:
+    """Return a form behind changes of coordinates, of the parameter and of units.
+
+    One coordinate may stay odd in itself, and all others even.
+    """
     n = len(form.names)
     circles = rng.random(n) < 0.25
     length = np.where(circles, 1.0, 10.0 ** rng.uniform(-3, 3, n))
@@ -496,15 +502,19 @@ def hidden(kind: str, form: Form, rng: Rng) -> Posed:  # noqa: PLR0915 - one cha
     ps = [
         2 * sympy.sin(q) if c else q / float(u) for q, c, u in zip(qs, circles, length, strict=True)
     ]
+    even = [p**2 if i == odd else p for i, p in enumerate(ps)]
     rs: list[Any] = []
     for i, v in enumerate(ps):
         a, b, c, d = rng.uniform(-0.3, 0.3, 4).tolist()
-        before = ps[int(rng.integers(i))] if i else 0
+        before = even[int(rng.integers(i))] if i else 0
         bent = 0 if circles[i] else abs(a) * v**3 / 3
-        rs.append(v + bent + b * sympy.sin(before) + c * before**2 + d * tau)
+        moved = b * sympy.sin(before) + c * before**2 + d * tau
+        rs.append(v + bent + (v * moved if i == odd else moved))
     for _ in range(min(n - 1, 2)):
         i, j = rng.choice(n, 2, replace=False)
         c, d = np.cos(v := rng.uniform(-1, 1)), np.sin(v)
+        if odd in (i, j):
+            continue
         rs[i], rs[j] = float(c) * rs[i] - float(d) * rs[j], float(d) * rs[i] + float(c) * rs[j]
     phi = sympy.lambdify([qs, TIME], [*rs, tau], "numpy")
     to = {sympy.Symbol(name): r for name, r in zip(form.names, rs, strict=True)}
@@ -543,7 +553,7 @@ def hidden(kind: str, form: Form, rng: Rng) -> Posed:  # noqa: PLR0915 - one cha
     def scaled(pair: tuple[str, Any]) -> SmoothFunction:
         size = float(10.0 ** rng.uniform(-3, 3))
         if rng.random() < 0.3:
-            size *= 1 + sympy.sin(ps[int(rng.integers(n))]) / 3
+            size *= 1 + sympy.sin(even[int(rng.integers(n))]) / 3
         return function(pair[0], size * pair[1].subs(to))
 
     parts: list[Any] = [
@@ -553,7 +563,7 @@ def hidden(kind: str, form: Form, rng: Rng) -> Posed:  # noqa: PLR0915 - one cha
     parts += [function(f"side{i}", sympy.cos(qs[i]) - 0.1) for i in np.flatnonzero(circles)]
     for i in range(int(rng.integers(0, 3))):
         far = function(f"far{i}", 9 + ps[int(rng.integers(n))] * rng.choice([-1.0, 1.0]))
-        if rng.random() < 0.3:
+        if rng.random() < 0.3 and odd < 0:
             far = AnyOf(far, function(f"off{i}", sympy.cos(ps[0]) - 7))
         parts.append(far)
     if not parts:
@@ -570,14 +580,17 @@ def hidden(kind: str, form: Form, rng: Rng) -> Posed:  # noqa: PLR0915 - one cha
     )  # fmt: skip
 
 
-def drawn(first: Callable[[Rng], Form], rng: Rng) -> Posed:
-    """Return a form with others added, hidden."""
+def drawn(first: Callable[[Rng], Form], rng: Rng, *, mirror: bool = False) -> Posed:
+    """Return a form with others added, hidden; its first coordinate may stay odd."""
     at = rng.uniform(-0.45, 0.45)
     form = turned(renamed(first(rng), "_0"), int(rng.choice([-1, 1])), at)
     if form.added:
         others = [rng.choice(PLAIN) for _ in range(int(rng.integers(0, 4)))]
         if rng.random() < 0.4:
-            others.append(rng.choice([opens, corner_limit, fold, pitchfork, exchange, reentrant]))
+            more = [opens, corner_limit, fold, exchange]
+            others.append(
+                rng.choice(more if mirror else [*more[:3], pitchfork, exchange, reentrant])
+            )
         for i, other in enumerate(others):
             sign = int(rng.choice([-1, 1]))
             more = turned(renamed(other(rng), f"_{i + 1}"), sign, rng.uniform(-0.45, 0.45))
@@ -586,14 +599,18 @@ def drawn(first: Callable[[Rng], Form], rng: Rng) -> Posed:
     assert len(form.names) <= 6
     values = sorted({e.at for e in form.events})
     assert np.diff(values).min(initial=1) > 1e-5
-    return hidden(first.__name__, form, rng)
+    return hidden(first.__name__, form, rng, 0 if mirror else -1)
 
 
-def problem(seed: int, number: int) -> Posed:
-    """Return a problem by its number; the kinds come one after the other."""
+def problem(seed: int, number: int, *, mirror: bool = False) -> Posed:
+    """Return a problem by its number; the kinds come one after the other.
+
+    With a mirror all are pitchforks, and a change of the first coordinate's sign is a symmetry of
+    the energy and of all functions that vanish on an arc.
+    """
     rng = np.random.default_rng([seed, number])
     while True:
         try:
-            return drawn(FORMS[number % len(FORMS)], rng)
+            return drawn(pitchfork if mirror else FORMS[number % len(FORMS)], rng, mirror=mirror)
         except AssertionError:  # near a degeneration, or beyond the map's reach
             continue

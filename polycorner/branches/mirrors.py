@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from polycorner import checks
-from polycorner.branches.diagram import BranchKind, Diagram
+from polycorner.branches.diagram import Arc, BranchKind, Diagram
 from polycorner.branches.system import Face
 from polycorner.intervals.balls import ball
+from polycorner.minimisation.methods import stationary_on
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.proofs.lists.images import Motion, functions_moved, motion, permutation
@@ -200,15 +201,25 @@ def _exchanges(diagram: Diagram, most: int) -> Iterator[tuple[tuple[int, ...], t
             if not low < high:
                 continue
             some = (0.7 * low + 0.3 * high, 0.3 * low + 0.7 * high)
-            other = [arc.at(arc.parameters.mean()) for arc in arcs if arc not in (one, two)]
-            before = np.array([*(f.at(v) for v in some for f in (one, two)), *other])
-            after = np.array([*(f.at(v) for v in some for f in (two, one)), *other])
+            places = [[_place(diagram, arc, v) for arc in (one, two)] for v in some]
+            other = [
+                _place(diagram, arc, arc.parameters.mean())
+                for arc in arcs if arc not in (one, two)
+            ]  # fmt: skip
+            before = np.array([*(x for pair in places for x in pair), *other])
+            after = np.array([*(x for pair in places for x in pair[::-1]), *other])
             # Beside the arc the energy tells apart what exchanges these points.
             probe = before[0] + problem.scales * np.linspace(0.01, 0.02, len(problem.scales))
             for g in islice(_exchanging(before / problem.scales, after / problem.scales), most):
                 image = np.array(g[1]) * probe[list(g[0])]
                 if np.isclose(value(image), value(probe), rtol=DEFAULT.alike, atol=DEFAULT.alike):
                     yield g
+
+
+def _place(diagram: Diagram, arc: Arc, value: float) -> Array:
+    """Return the point of an arc at a value of the parameter, by Newton's method."""
+    problem, near = diagram.problem_at(value), arc.at(value)
+    return stationary_on(problem.polyhedron, problem.energy, near, arc.active).point
 
 
 def _exchanging(before: Array, after: Array) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:

@@ -210,7 +210,7 @@ class Pitchfork:
         mirror, y = divided.mirror, divided.mirror.parts(x)
         return bool(
             divided.eps.contains(y[divided.way])
-            and self.trunk.covers(mirror.point(y, 0))
+            and (not y[divided.way].contains(0) or self.trunk.covers(mirror.point(y, 0)))
             and _alone(divided, y, self.arms.solution)
         )
 
@@ -397,18 +397,8 @@ def _alone(divided: Divided, y: "Sequence[Ball]", known: "Sequence[Ball]") -> bo
     near = divided.system.at(mirror.point(y, ball(0.5, 0.5)))
     if isinstance(near, Undecided):
         return False
-    rows, odd = mirror.adapted(near.jacobian), sorted(mirror.odd)
-    table = [[row[c] for c in odd] for r, row in enumerate(rows) if r in mirror.odd_equations]
-    table.append([ball(int(c == way)) for c in odd])
-    middle = np.array([[float(b.mid()) for b in row] for row in table])
-    if not np.isfinite(middle).all():
-        return False
-    left, hull = matrix(np.linalg.pinv(middle).tolist()), list(y)
-    right = column([*[ball(0)] * len(odd), ball(1)])
-    try:
-        for j, x in zip(odd, entries((left * matrix(table)).solve(left * right)), strict=True):
-            hull[j] = x
-    except ZeroDivisionError:
+    hull = _kernel(divided, mirror.adapted(near.jacobian), y)
+    if not hull:
         return False
     some = replace(divided, eps=y[way].union(-y[way]))
     found = some.jacobian([a.union(b) for a, b in zip(hull, known, strict=True)])
@@ -416,6 +406,34 @@ def _alone(divided: Divided, y: "Sequence[Ball]", known: "Sequence[Ball]") -> bo
     if backwards is None or isinstance(found, Undecided):
         return False
     return is_regular((backwards * matrix(found)).tolist())
+
+
+def _kernel(divided: Divided, rows: "list[list[Ball]]", y: "Sequence[Ball]") -> "list[Ball]":
+    """Return adapted coordinates with all ``u`` that matrices of ``A`` annihilate, ``u_k = 1``.
+
+    Empty where these are not enclosed, or where ``u_k`` may be 0.
+    """
+    mirror, units, way = divided.mirror, divided.system.units, divided.way
+    others, hull = sorted(mirror.odd - {way}), list(y)
+    hull[way] = ball(1)
+    if others:
+        places = [
+            (j, row)
+            for (_, j, _), (_, row, _) in zip(mirror.unknowns, mirror.equations, strict=True)
+        ]
+        table = [[units[j] * rows[r][c] * units[c] for c in others] for j, r in places]
+        right = column([-units[j] * rows[r][way] for j, r in places])
+        middle = np.array([[float(b.mid()) for b in row] for row in table])
+        if not np.isfinite(middle).all():
+            return []
+        left = matrix(np.linalg.pinv(middle).tolist())
+        try:
+            found = entries((left * matrix(table)).solve(left * right))
+        except ZeroDivisionError:
+            return []
+        for c, x in zip(others, found, strict=True):
+            hull[c] = x * units[c]
+    return hull
 
 
 def _balls(x: Array) -> "list[Ball]":

@@ -9,7 +9,7 @@ import sympy
 from benchmarks.trials.known_branches import FORMS, problem
 from benchmarks.trials.run_branches import complaints
 from polycorner import Manifold, Polyhedron, SmoothFunction, stationary_on
-from polycorner.branches import branches
+from polycorner.branches import branches, prove_branches
 from polycorner.minimisation.problem import Problem
 
 SEED = 7
@@ -36,6 +36,19 @@ def test_the_judge_notices_what_is_lost_and_what_is_false():
     moved = replace(found.events[0], kind=type(found.events[0].kind).FOLD)
     for copy in (lost, turned, replace(found, events=(moved, *found.events[1:]))):
         assert list(complaints(posed, copy)) != []
+
+
+@pytest.mark.parametrize("number", [7, 18])
+def test_pitchforks_are_complete(number):
+    """The mirror is found; nothing else is in a box around the arcs."""
+    posed = problem(11, number, mirror=True)
+    found = branches(start(posed), "t", posed.interval)
+    assert list(complaints(posed, found)) == []
+    assert "BRANCH" in {e.kind.name for e in found.events}
+    every = np.vstack([arc.points for arc in found.arcs])
+    room = 0.02 * np.array(posed.polyhedron.manifold.scales)
+    box = np.array([every.min(axis=0) - room, every.max(axis=0) + room]).T
+    assert prove_branches(found, box=box.tolist()).complete
 
 
 def plain(number):

@@ -21,8 +21,8 @@ the derivatives ``F_even''(u, u)`` and ``F_odd'''(u, u, u) / 3`` at points betwe
 are two arcs, and ``e = 0`` is the branch point.
 
 *Nothing else.*  Of a box of unknowns with ``t`` and ``a_k`` in the intervals: solutions with ``a =
-0`` are on the trunk.  Others have ``A(s, a) a = 0``; the matrices of ``A`` with the row of ``u_k =
-1`` have independent columns, so that ``a_k`` is not 0 and ``u = a / a_k`` is enclosed.  On all that
+0`` are on the trunk.  Others have ``A(s, a) a = 0``; the matrices of ``A`` have independent columns
+beside that of ``a_k``, so that ``a_k`` is not 0 and ``u = a / a_k`` is enclosed.  On all that
 lies between ``(s, u)`` and the arms, ``|e| <= |a_k|``, the derivatives of the equations above are
 regular: ``(s, u)`` is the point of an arm.  For ``a = 0`` it follows in this way that the trunk has
 no other point in the tube with ``A(s, 0) u = 0``.
@@ -270,16 +270,21 @@ class StoredPitchfork:
         """
         mirror, way = self.mirror, self.way
         rows = mirror.adapted(self.face.at(mirror.point(y, ZERO.union(arb(1))))[1])
-        table = [[rows[r][c] for c in mirror.odd] for r in mirror.odd_equations]
-        form = arb_mat([*table, [arb(int(c == way)) for c in mirror.odd]])
-        right = arb_mat([[ZERO]] * len(table) + [[arb(1)]])
-        middle = form.mid().transpose()
+        places = [(j, r) for (_, j, _), (_, r, _) in
+                  zip(mirror.unknowns, mirror.equations, strict=True)]  # fmt: skip
+        units, others, hull = self.face.units, [c for c in mirror.odd if c != way], list(y)
+        hull[way] = arb(1)
         try:
-            left = (middle * form.mid()).inv().mid() * middle
-            u = (left * form).solve(left * right).entries()
-            hull = list(y)
-            for j, x in zip(mirror.odd, u, strict=True):
-                hull[j] = x
+            if others:
+                form = arb_mat(
+                    [[units[j] * rows[r][c] * units[c] for c in others] for j, r in places]
+                )
+                right = arb_mat([[-units[j] * rows[r][way]] for j, r in places])
+                middle = form.mid().transpose()
+                left = (middle * form.mid()).inv().mid() * middle
+                u = (left * form).solve(left * right).entries()
+                for c, x in zip(others, u, strict=True):
+                    hull[c] = x * units[c]
             hull = [a.union(b) for a, b in zip(hull, self.arms, strict=True)]
             jacobian = arb_mat(self.derivatives(hull, y[way].abs_upper()))
             (jacobian.mid().inv().mid() * jacobian).inv()
@@ -290,8 +295,10 @@ class StoredPitchfork:
     def covers(self, x: Sequence[arb]) -> bool:
         """Whether all solutions in a box of unknowns are on the four curves."""
         y = self.mirror.parts(x)
-        fine = abs(y[self.way]) <= self.eps and self.trunk.covers(self.mirror.point(y, 0))
-        return bool(fine) and self.alone(y)
+        if not abs(y[self.way]) <= self.eps:
+            return False
+        odd = y[self.way] > 0 or y[self.way] < 0
+        return bool(odd or self.trunk.covers(self.mirror.point(y, 0))) and self.alone(y)
 
     @staticmethod
     def narrowed(x: list[arb], steps: int) -> list[arb]:
