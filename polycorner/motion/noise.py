@@ -85,8 +85,8 @@ class Solver(Checked):
         and ``Effort.residual`` says how much is missing.  Forces spread only so far in a step, so
         that heaps are a little soft and friction creeps.  Bodies that overlap by more than 0.1 % of
         their size are moved apart.  Where a body would pass through another, such an island takes
-        the step in shorter ones, if others do.  Not for bodies that turn in space, unless they are balls.
-        Default 0: islands are solved, whatever their size.
+        the step in shorter ones, if others do.  Not for bodies that turn in space, unless they are
+        balls.  Default 0: islands are solved, whatever their size.
     threads : int, optional
         How many threads do a step together; default 1.  Results are the same, bit for bit, for any
         number.  It pays for islands of many bodies, or many islands, and on idle processors.
