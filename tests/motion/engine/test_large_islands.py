@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from polycorner import velocities
 from polycorner.bodies import Arrangement, HalfSpace, Mass, capsule, disc
 from polycorner.motion import EventKind, Solver
 from polycorner.motion.engine.crowds import CROWD
@@ -212,3 +213,26 @@ def test_bodies_of_a_crowd_that_are_sunk_into_each_other_are_told():
     events = list(engine.advance(1))
     failed = [event for event in events if event.kind is EventKind.FAILED]
     assert {400, 401} in [set(event.bodies) for event in failed]
+
+
+def test_limits_on_velocities_act_in_a_large_island():
+    """Discs that a slope accelerates, in rows upon each other, stay below a speed."""
+    arrangement = Arrangement(
+        {"D": disc(1.0)}, {"floor": HalfSpace([0, 1], [0, 0])}, orientations="all"
+    )
+    along, most = velocities(arrangement.manifold)[0], 0.5
+    system = arrangement.system(
+        gravity=[3, -10], friction=0.2, count=60, limits={"speed": most - along}
+    )
+    rows, columns = np.divmod(np.arange(60), 10)
+    q = np.column_stack([2.01 * columns + rows % 2, 1.0 + 1.75 * rows, 0 * rows])
+    engine, largest, fastest = start(system, system.state(q), 5e-3), 0, []
+    for _ in range(60):
+        engine.advance(1)
+        largest = max(largest, np.diff(engine.work.island.start).max())
+        fastest.append(engine.motion.v[:, 0].max())
+    assert largest > LARGE
+    assert engine.effort.unconverged == 0
+    assert max(fastest) <= most + engine.model.tolerance * abs(engine.motion.v).max()
+    assert max(fastest) > 0.99 * most
+    assert engine.motion.limit_acts.any()
