@@ -134,6 +134,10 @@ class Noise(Checked):
     each step gets its exact integral: the motion converges as ``h -> 0``, and as ``tau -> 0`` the
     force tends to the white one of the same ``sigma``.
 
+    *Scatter*: what a contact under a known load can hold differs from stop to stop.  Whenever it
+    comes to stick, its static set is multiplied by a factor drawn anew, lognormal with the mean 1
+    and the standard deviation ``s``, but so that the dynamic set remains inside it.
+
     Each number is a function of the seed, the time, the body and its use (SplitMix64, [Steele]), so
     a run that resumes meets the same noise.
 
@@ -149,6 +153,8 @@ class Noise(Checked):
         force times sqrt(s).
     kick_time : float, optional
         How long a random force is held, in s, or 0 (default): white noise.
+    scatter : mapping from str to float, optional
+        ``s`` by kind of friction, such as ``{"rolling": 0.3}``; default none.
     seed : int, optional
         Any whole number from 0 to 2^63 - 1; default 0.
     """
@@ -158,11 +164,14 @@ class Noise(Checked):
     kicks: Mapping[str, float] = field(default_factory=dict)
     kick_time: float = 0.0
     seed: int = 0
+    scatter: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         real("chatter", self.chatter, least=0)
         real("correlation_time", self.correlation_time, least=1e-12, unit="s")
         for size in mapping("kicks", self.kicks).values():
             real("kicks", size, least=0)
+        for width in mapping("scatter", self.scatter).values():
+            real("scatter", width, least=0)
         real("kick_time", self.kick_time, least=0, unit="s")
         whole("seed", self.seed, least=0, most=2**63 - 1)
