@@ -159,8 +159,8 @@ GROUPS = (
         "Velocities, times and contacts of bodies as symbols in formulas.",
         {
             "": "velocities",
-            "motion": "ContactFamily Tie SpeedZones motions pair_coordinates pair_velocities "
-            "time_symbol angular_velocity rotational_energy",
+            "motion": "Attraction ContactFamily Tie SpeedZones motions pair_coordinates "
+            "pair_velocities time_symbol angular_velocity rotational_energy",
         },
     ),
     Group(
