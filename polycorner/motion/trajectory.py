@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from polycorner import checks
+from polycorner.checks import refuse
 from polycorner.kinds import checked
 from polycorner.motion.engine.driver import Effort
 from polycorner.motion.events import Event, EventKind
@@ -319,7 +320,7 @@ class Trajectory(Checked, Printed):
         >>> sum(row.force for row in path.contacts(-1)).round(6).tolist()
         [-8.0, 40.0]
         """
-        index = self.at(float(when)) if isinstance(when, float) else int(when)
+        index = self._instant("when", when) if isinstance(when, float) else int(when)
         index = range(len(self))[index]
         rubbed = self.friction.at(index, self.system.bodies.rubbing)
         normal = {(bodies, name): force for bodies, name, force in self.touching[index]}
@@ -331,9 +332,12 @@ class Trajectory(Checked, Printed):
     @checked
     def at(self, time: float) -> int:
         """Return the index of the last recorded instant that is not after ``time``."""
-        if not self.times[0] <= time <= self.times[-1]:
-            msg = f"time: expected one from {self.times[0]:g} to {self.times[-1]:g}; got {time:g}"
-            raise ValueError(msg)
+        return self._instant("time", time)
+
+    def _instant(self, argument: str, time: float) -> int:
+        first, last = self.times[[0, -1]].tolist()
+        if not first <= time <= last:
+            refuse(argument, f"a time from {first:g} to {last:g}", float(time))
         return int(np.searchsorted(self.times, time, side="right")) - 1
 
 

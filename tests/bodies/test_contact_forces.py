@@ -308,7 +308,7 @@ def test_an_instant_is_a_number_or_a_time():
     assert [r.normal for r in path.contacts(1)] == [r.normal for r in path.contacts(0.015)]
     with pytest.raises(IndexError):
         path.contacts(7)
-    with pytest.raises(ValueError, match=r"time: expected one from 0 to 0\.02"):
+    with pytest.raises(ValueError, match=r"when: expected a time from 0 to 0\.02"):
         path.contacts(0.5)
 
 

@@ -64,6 +64,8 @@ FUNCTIONS = {
     "named": ("study",),
     "path": ("store", "read", "module"),  # a sentence about a file begins with its name
     "edges": ("budget",),
+    "shortest_step": ("first_step",),  # which may not be shorter
+    "scale": ("path",),  # a mesh of which nothing is left
     "potential": ("V",),
     "kinetic": ("T",),
     "polyhedron": ("q", "load"),  # of another dimension than the other arguments
