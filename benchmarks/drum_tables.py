@@ -100,7 +100,8 @@ def told_of_bunches(found: xr.Dataset) -> str:
     ]
     total, done = found["status"].size, len(members)
     lines = [f"{done} of {total} starts of the study were followed.", "", table(rows)]
-    return "\n".join([*lines, *separating(list(groups.values()))])
+    several = list(groups.values())
+    return "\n".join([*lines, *separating(several), *by_start(several)])
 
 
 def of_one_set(some: list[Row]) -> Row:
@@ -147,6 +148,39 @@ def pooled(groups: list[list[Row]], name: str) -> float:
     x, y = np.concatenate([p - p.mean(axis=1, keepdims=True) for p in pairs], axis=1)
     size = math.sqrt(float((x @ x) * (y @ y)))
     return float(x @ y) / size if size else math.nan
+
+
+def by_start(groups: list[list[Row]]) -> list[str]:
+    """Return what starts have in common that were followed with every set of parameters."""
+    each = [{run.get("start"): run for run in group} for group in groups]
+    starts = [start for start in each[0] if all(start in one for one in each)] if each else []
+    if len(each) < 2 or len(starts) < 2:
+        return []
+    rows = [
+        {
+            "start": start,
+            f"left, mean of {len(each)} sets": mean([one[start]["left"] for one in each]),
+            "in the largest group after a twentieth of the time": mean(
+                [one[start]["heap_at"][0] for one in each]
+            ),
+        }
+        for start in starts
+    ]
+    left = np.array([[one[start]["left"] for one in each] for start in starts], dtype=float)
+    of_starts, of_sets = (f"{100 * part:.0f} %" for part in parts_of_variance(left))
+    told = f"Of the variance of the {left.size} numbers {of_starts} lies between starts, {of_sets} "
+    told += "between sets."
+    return ["", table(rows), "", told]
+
+
+def parts_of_variance(values: np.ndarray) -> tuple[float, float]:
+    """Return the parts of the variance of a table between rows, and between columns."""
+    away = values - values.mean()
+    total = (away**2).mean()
+    if not total:
+        return math.nan, math.nan
+    rows, columns = ((away.mean(axis=k) ** 2).mean() / total for k in (1, 0))
+    return float(rows), float(columns)
 
 
 def ranks(values: Sequence[float]) -> np.ndarray:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drum_tables import main, pooled
+from drum_tables import main, parts_of_variance, pooled
 
 from polycorner.dumbbells.studies import bunch
 from polycorner.dumbbells.studies.catalogue import STUDIES
@@ -52,6 +52,21 @@ def test_bunches_are_told_by_sets_of_parameters(tmp_path):
     assert times
     assert max(times) <= 0.2
     assert all(len(run["heap_at"]) == 20 for run in kept)
+
+    head, _, *lines = rows(text)[-5:]
+    assert head[:2] == ["start", "left, mean of 2 sets"]
+    for start, line in zip((0, 1, 3), lines, strict=True):
+        both = [single[s][(0, 1, 3).index(start)]["left"] for s in (0.15, 0.3)]
+        assert line[0] == str(start)
+        assert line[1].startswith(f"{np.mean(both):.1f}")
+
+
+def test_parts_of_a_variance():
+    """Of sums of a row's and a column's number all, of their products none."""
+    rows, columns = np.array([1.0, -1.0, 3.0, -3.0]), np.array([2.0, -2.0])
+    one, other = parts_of_variance(7 + rows[:, None] + columns)
+    assert [one, other] == pytest.approx([5 / 9, 4 / 9])
+    assert parts_of_variance(rows[:, None] * columns) == pytest.approx((0, 0))
 
 
 def test_correlations_are_within_sets():
