@@ -193,8 +193,8 @@ def _exchanges(diagram: Diagram, most: int) -> Iterator[tuple[tuple[int, ...], t
     As pairs of ``order`` and ``signs``, ``(g q)_i = signs_i q_{order_i}``; each is its own inverse.
     """
     problem, value = diagram.problem, diagram.problem.energy.value
-    for event in (e for e in diagram.events if e.kind is BranchKind.BRANCH):
-        arcs = [diagram.arcs[k] for k in event.arcs]
+    for k in (k for k, e in enumerate(diagram.events) if e.kind is BranchKind.BRANCH):
+        arcs = [arc for arc in diagram.arcs if k in arc.events]
         for one, two in combinations(arcs, 2):
             low = max(one.parameters[0], two.parameters[0])
             high = min(one.parameters[-1], two.parameters[-1])

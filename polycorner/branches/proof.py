@@ -257,13 +257,13 @@ class _Prover:
         self.watched = Watched(problem.inequalities, low, high)
         self.tolerances = Tolerances()
         self.pitchforks = {
-            k: self._pitchfork(event)
+            k: self._pitchfork(k, event)
             for k, event in enumerate(diagram.events) if event.kind is BranchKind.BRANCH
         }  # fmt: skip
 
-    def _pitchfork(self, event: BranchEvent) -> Pitchfork | Undecided:
+    def _pitchfork(self, k: int, event: BranchEvent) -> Pitchfork | Undecided:
         """Return the pitchfork of an event, of any symmetry that shows one."""
-        arcs = [self.diagram.arcs[k] for k in event.arcs]
+        arcs = [arc for arc in self.diagram.arcs if k in arc.events]
         found = Undecided("the branch point", "no symmetry of the formulas shows a pitchfork")
         if len({arc.active for arc in arcs}) != 1:
             return found

@@ -88,8 +88,8 @@ def test_a_diagram_is_proved_and_verified(capsys, tmp_path):
 
 
 def test_a_diagram_that_is_not_proved_has_no_file(capsys, tmp_path):
-    path, out = tmp_path / "pitchfork.toml", tmp_path / "out"
-    path.write_text(SPRING.replace("x**2/2 - load*x", "x**4/4 - load*x**2/2").replace(
+    path, out = tmp_path / "crossing.toml", tmp_path / "out"
+    path.write_text(SPRING.replace("x**2/2 - load*x", "x**3/3 - load*x**2/2").replace(
         'inequalities.wall = "x >= 0"', 'inequalities.wall = "x >= -3"'
     ))  # fmt: skip
     options = ("--vary", "load=-1:1", "--prove", "--out", str(out))
