@@ -50,6 +50,7 @@ from polycorner.formulas.families import Family
 from polycorner.landscapes import basins, landscape, search_landscape
 from polycorner.minimisation import stationary_on
 from polycorner.motion import (
+    Attraction,
     ContactFamily,
     Drift,
     Friction,
@@ -142,6 +143,7 @@ CASES = {
     "System.rheonomic": ("rheonomic", lambda e, _: System(D, MOVING, rheonomic={"h": e})),
     "System.limits": ("limits", lambda e, _: System(D, MOVING, limits={"f": e})),
     "System.nonholonomic": ("nonholonomic", lambda e, _: System(D, MOVING, nonholonomic={"h": e})),
+    "Attraction.energy.gap": ("gap", lambda e, _: Attraction(1.0, 0.1).energy(e)),
     "Drift.velocity": ("velocity", lambda e, _: Drift(D, {"x": e})),
     "Drift.limits": ("limits", lambda e, _: Drift(D, {"x": 1.0}, limits={"f": e})),
     "Friction.slip": ("slip", lambda e, _: Friction("f", (e,), Interval(0.5), "right")),
