@@ -151,10 +151,10 @@ def pooled(groups: list[list[Row]], name: str) -> float:
 
 
 def by_start(groups: list[list[Row]]) -> list[str]:
-    """Return what starts have in common that were followed with every set of parameters."""
+    """Return what three or more starts have in common that were followed with every set."""
     each = [{run.get("start"): run for run in group} for group in groups]
     starts = [start for start in each[0] if all(start in one for one in each)] if each else []
-    if len(each) < 2 or len(starts) < 2:
+    if len(each) < 2 or len(starts) < 3:
         return []
     rows = [
         {

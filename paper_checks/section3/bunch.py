@@ -243,10 +243,10 @@ def of_sixty_leave(
         f"{LEAVING[0]} dumbbells of {LARGER[0]:g} mm in a drum {top:g} mm long, "
         f"{OBSERVED_TIME:g} s: {'; '.join(listed)}",
         numbers,
-        "with the sliding friction that the captions imply some starts lose half of the bunch and "
-        "others hardly anybody, in dyads of both hands and in none; with that of the text a bunch "
-        "stays interlocked, also under noise that makes right-handed dyads that are alone climb. "
-        "Dumbbells lie in one layer; the drum's length and the noise are not given",
+        "with the sliding friction that the captions imply some starts lose a third of the bunch "
+        "and others hardly anybody, in dyads of both hands and in none; with that of the text a "
+        "bunch stays interlocked, also under noise that makes right-handed dyads that are alone "
+        "climb. Dumbbells lie in one layer; the drum's length and the noise are not given",
     )
 
 
