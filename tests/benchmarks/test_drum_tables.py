@@ -110,3 +110,54 @@ def test_a_study_that_was_not_computed_is_named(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["nothing", "--stores", str(tmp_path), "--out", str(tmp_path)])
     assert "nothing/sweep.zarr" in capsys.readouterr().err
+
+
+def test_what_the_page_says_of_the_grid_is_in_its_file():
+    docs = FOLDER.parents[1] / "docs"
+    found = json.loads((docs / "tables" / "friction.json").read_text(encoding="utf-8"))["runs"]
+    some = [run for run in found if run["start"] < 8]
+    told = " ".join((docs / "drum_results.md").read_text(encoding="utf-8").split())
+
+    def means(*axes):
+        sets = {}
+        for run in some:
+            sets.setdefault(tuple(run[a] for a in axes), []).append(run["left"])
+        return {key: round(float(np.mean(left))) for key, left in sets.items()}
+
+    hands = [[e["as"] for e in run["exits"]] for run in some]
+    right, left = (sum(h.count(k) for h in hands) for k in ("R", "L"))
+    every, number = means("sliding_ratio", "rolling", "rubbing", "sliding"), sum(map(len, hands))
+    assert len(every) * 8 == len(some) == 256
+    assert f"{min(every.values())} to {max(every.values())} leave" in told
+    assert sum(run["left"] >= 40 for run in some) == 2
+    assert "Two of 256 bunches lose forty or more" in told
+    assert f"are a third of the {number:,} that leave, left-handed ones another" in told
+    assert [right / number, left / number] == pytest.approx([1 / 3, 1 / 3], abs=0.02)
+    assert sum(2 * h.count("R") > len(h) for h in hands) == 16
+    sliding, rubbing = means("sliding"), means("rubbing")
+    others = [n for (value,), n in sliding.items() if value > 0.5]
+    assert f"of 0.3, {sliding[0.3,]} leave in the mean, else {min(others)} to {max(others)}" in told
+    assert f"of 0.05 {rubbing[0.05,]}, with 0.3 {rubbing[0.3,]}" in told
+
+
+def test_what_the_page_says_of_those_that_leave_is_in_its_files():
+    docs = FOLDER.parents[1] / "docs"
+    told = " ".join((docs / "drum_results.md").read_text(encoding="utf-8").split())
+    files = [docs / "tables" / f"{name}.json" for name in ("captions", "steps")]
+    several = [json.loads(file.read_text(encoding="utf-8"))["runs"] for file in files]
+    several[1] = [run for run in several[1] if run["dt"] == 0.004]
+    exits = [[e for run in runs for e in run["exits"]] for runs in several]
+    headings = [[e["heading"] for e in some] for some in exits]
+    count, middle = sum(map(len, exits)), [round(float(np.median(h))) for h in headings]
+    assert min(map(min, headings)) > 0
+    assert f"All {count} have positive headings, {middle[0]} and {middle[1]}°" in told
+    times = [np.array([e["time"] for e in run["exits"]]) for runs in several for run in runs]
+    together = sum(int((abs(t - one) <= 1).sum() > 2) for t in times for one in t)
+    assert "more than one in five leaves within a second of two others" in told
+    assert together / count > 0.2
+    early = np.mean([one <= 300 for t in times for one in t])
+    assert early == pytest.approx(2 / 3, abs=0.02)
+    space = rows((docs / "tables" / "space.md").read_text(encoding="utf-8"))[-6:]
+    numbers = [cell.replace(",", "").split() for cell in (row[4] for row in space)]
+    left, right, other = (sum(int(cell[k]) for cell in numbers) for k in (0, 1, 3))
+    assert f"{right} of {left} in right-handed dyads, {other} in left-handed ones" in told
