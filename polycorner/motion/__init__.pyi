@@ -1,6 +1,6 @@
 from .accelerations import Accelerations, Consistency, accelerations
 from .assembly import Assembly
-from .bodies import Attraction
+from .attraction import Attraction
 from .checkpoints import Checkpoint
 from .contacts import (
     ContactFamily,

@@ -3,15 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.checks import real
 from polycorner.formulas.bundles import Call
-from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
+from polycorner.motion.attraction import Attraction
 from polycorner.motion.convex_sets import ConvexSet, in_words
 from polycorner.motion.formulation import Formulation
 from polycorner.motion.noise import OPTIONS
@@ -19,10 +17,7 @@ from polycorner.motion.scenes import Rubbing, Scene
 from polycorner.motion.tie_forms import NO_TIES, Ties
 from polycorner.printing import number
 from polycorner.spaces.manifold import Array
-from polycorner.values import Checked, Value, cached_property
-
-if TYPE_CHECKING:
-    import sympy
+from polycorner.values import Value, cached_property
 
 # Causes of dissipation.
 IMPACT = "impact"
@@ -149,57 +144,6 @@ class MovingBody(Value):
     def reads_time(self, call: Call) -> bool:
         """Whether a kernel of gaps does."""
         return max(call.reads, default=-1) >= len(self.formulation.coordinates)
-
-
-@dataclass(frozen=True)
-class Attraction(Checked):
-    """A short-range attraction along a gap ``g``, with a finite energy of adhesion.
-
-    The force is ``a`` along ``-grad g`` where the gap is closed, and falls to zero at the range
-    ``d``: ``a (1 - g/d)`` for ``0 <= g <= d``.  It has the energy ``-a d (1 - g/d)^2 / 2``, so
-    that ``a d / 2`` parts the two.  The force of a contact that is closed bears it: the contact
-    opens where more than ``a`` pulls at it, and friction acts on what it presses with, the pull
-    included, as between wet grains ([Radjai]).  The smaller the range is, the less depends on it
-    but the energy.
-
-    Parameters
-    ----------
-    force : float
-        ``a >= 0``; a force if the gap is a length.
-    range : float
-        ``d > 0``, in the unit of the gap.
-
-    Raises
-    ------
-    TypeError, ValueError
-        Naming the parameter, what was expected and what came.
-    """
-
-    force: float
-    range: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "force", real("force", self.force, least=0))
-        object.__setattr__(self, "range", real("range", self.range, above=0))
-        super().__post_init__()
-
-    def energy(self, gap: "sympy.Expr") -> "sympy.Expr":
-        """Return the energy as a function of a gap, to be added to a potential.
-
-        Examples
-        --------
-        >>> from polycorner import Manifold
-        >>> (y,) = Manifold.euclidean("y").symbols
-        >>> energy = Attraction(force=3.0, range=0.5).energy(y)
-        >>> [float(energy.subs(y, gap)) for gap in (0.0, 0.25, 0.5, 2.0)]
-        [-0.75, -0.1875, 0.0, 0.0]
-        """
-        import sympy
-
-        gap = as_expression("gap", gap)
-        closed = self.force * (gap - self.range / 2)
-        near = -self.force * self.range / 2 * (1 - gap / self.range) ** 2
-        return sympy.Piecewise((closed, gap < 0), (near, gap < self.range), (0, True))
 
 
 @dataclass(frozen=True)

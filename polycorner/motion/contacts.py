@@ -10,7 +10,8 @@ from polycorner.formulas.expressions import as_expression, as_expressions, writt
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction, with_numbers
 from polycorner.formulas.fusion import written_out
-from polycorner.motion.bodies import RUBBING, Attraction, PairContacts, PairLaw
+from polycorner.motion.attraction import Attraction
+from polycorner.motion.bodies import RUBBING, PairContacts, PairLaw
 from polycorner.motion.convex_sets import ConvexSet
 from polycorner.motion.formulation import TIME, dotted
 from polycorner.motion.friction import Interval
