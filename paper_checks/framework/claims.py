@@ -1,7 +1,7 @@
 """Claims of the paper, and findings with numbers computed when the check runs."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 
@@ -12,6 +12,7 @@ class Verdict(Enum):
     HOLDS_UNDER = "holds under stated conditions"
     CORRECTED = "corrected"
     REFUTED = "refuted"
+    NOT_REPRODUCED = "not reproduced"  # of simulations, which try some friction and noise only
     NOT_TESTABLE = "not testable"
 
 
@@ -84,3 +85,10 @@ class Claim:
     perturbed: Callable[[], Finding] | None
     slow: bool = False
     figure: str | None = None
+
+    def examine(self) -> Finding:
+        """Return what the check finds; a simulation alone does not refute what was observed."""
+        finding = self.check()
+        if self.means is Means.SIMULATION and finding.verdict is Verdict.REFUTED:
+            return replace(finding, verdict=Verdict.NOT_REPRODUCED)
+        return finding

@@ -51,7 +51,7 @@ def _to_do(result: Result) -> str | None:
     verdict = None if result.finding is None else result.finding.verdict
     if verdict is Verdict.HOLDS_UNDER:
         return state
-    if verdict in (Verdict.REFUTED, Verdict.CORRECTED):
+    if verdict in (Verdict.REFUTED, Verdict.NOT_REPRODUCED, Verdict.CORRECTED):
         return simulate if result.claim.means is Means.SIMULATION else correct
     return None
 

@@ -24,7 +24,7 @@ SOURCE = (
     "The paper: S. Ghosh, A. P. Merin, S. Bhattacharya, N. Nitsure, Curvilinear polyhedra as "
     "dynamical arenas, illustrated by an example of self-organized locomotion, arXiv:1605.04438."
 )
-MARKS = dict(zip(VERDICTS, "✓◐✎✗–!", strict=True))
+MARKS = dict(zip(VERDICTS, "✓◐✎✗∅–!", strict=True))
 CLASSES = {
     verdict: verdict.replace(" stated conditions", "").replace(" ", "-") for verdict in VERDICTS
 }

@@ -227,7 +227,7 @@ def _examine(catalogue: str, name: str) -> Examined:
     (claim,) = (claim for claim in import_module(catalogue).CLAIMS if claim.id == name)
     start = time.perf_counter()
     try:
-        finding = claim.check()
+        finding = claim.examine()
         checks.instance("check", finding, Finding)
         finding, error = replace(finding, numbers=dict(finding.numbers)), ""
     except Exception as problem:  # every exception is a result of this claim

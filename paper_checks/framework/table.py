@@ -15,6 +15,7 @@ COLOURS = {
     Verdict.HOLDS_UNDER.value: "cyan",
     Verdict.CORRECTED.value: "yellow",
     Verdict.REFUTED.value: "red",
+    Verdict.NOT_REPRODUCED.value: "magenta",
     Verdict.NOT_TESTABLE.value: "bright_black",
     "error": "red",
 }

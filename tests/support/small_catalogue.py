@@ -25,9 +25,9 @@ def sleeps():
     return found()
 
 
-def claim(name, check, section="2", **options):
+def claim(name, check, section="2", means=Means.NUMERICAL, **options):
     statement = f"statement {name} with $x_1 \\ge 0$"
-    return Claim(name, section, "somewhere", statement, Means.NUMERICAL, check, None, **options)
+    return Claim(name, section, "somewhere", statement, means, check, None, **options)
 
 
 CLAIMS = (
@@ -36,6 +36,7 @@ CLAIMS = (
     claim("A3a", dies),
     claim("A3b", partial(found, Verdict.CORRECTED, r"It is $\alpha < 1$ & more"), "C"),
     claim("A4", lambda: found(Verdict.REFUTED), "C"),  # cannot be sent to another process
+    claim("A5", partial(found, Verdict.REFUTED), "C", Means.SIMULATION),
     claim("B1", partial(found, Verdict.HOLDS_UNDER, "for small $x$"), "C", figure="tutorial"),
     claim("B2", lambda: None, "C"),
     claim("S1", sleeps, "C", slow=True),

@@ -57,6 +57,7 @@ def test_verdicts_and_errors(done):
         "A3a": "error",
         "A3b": "corrected",
         "A4": "refuted",
+        "A5": "not reproduced",
         "B1": "holds under stated conditions",
         "B2": "error",
     }
@@ -74,12 +75,23 @@ def test_records_counts_and_what_to_act_on(done):
         assert list(record)[:6] == ["id", "section", "claim", "means", "verdict", "evidence"]
     assert table["A1"]["numbers"] == {"half": 0.5}
     assert table["A2"]["evidence"] == "ValueError: no such thing"
-    expected = ["holds", "holds under stated conditions", "corrected", "refuted", "error"]
+    expected = [
+        "holds",
+        "holds under stated conditions",
+        "corrected",
+        "refuted",
+        "not reproduced",
+        "error",
+    ]
     assert list(counts(found)) == expected
     groups = {
         title: [result.claim.id for result in group] for title, group in to_act_on(found).items()
     }
-    assert groups == {"To correct": ["A3b", "A4"], "Conditions to state": ["B1"]}
+    assert groups == {
+        "To correct": ["A3b", "A4"],
+        "Not found in simulations": ["A5"],
+        "Conditions to state": ["B1"],
+    }
 
 
 def test_what_simulations_do_not_show_is_apart():
@@ -101,7 +113,7 @@ def test_terminal(done):
     told = run_text(found)
     assert "x_1 ≥ 0" in told
     assert "What an author would act on" in told
-    assert told.splitlines()[-1].startswith("7 claims: 1 holds, ")
+    assert told.splitlines()[-1].startswith("8 claims: 1 holds, ")
     assert run_text(found, quiet=True).count("\n") == 0
 
 
@@ -176,5 +188,6 @@ def test_the_verdicts_are_all_there():
         "holds under stated conditions",
         "corrected",
         "refuted",
+        "not reproduced",
         "not testable",
     }
