@@ -294,7 +294,7 @@ class Arrangement(Checked, Printed):
         *,
         gravity: ArrayLike | Sequence[Any] | None = None,
         density: float = 1.0,
-        masses: Mapping[str, Mass] | None = None,
+        masses: Mapping[str, Mass | float] | None = None,
         friction: Coefficients = 0.0,
         rolling: Coefficients = 0.0,
         restitution: Restitution = 0.0,
@@ -323,7 +323,8 @@ class Arrangement(Checked, Printed):
             for walls that are shaken together, in their axes, it is ``g - a(t)``.
         density : float, optional
             Mass per area or volume of bodies without a mass of their own.
-        masses : mapping from str to Mass, optional
+        masses : mapping from str to Mass or float, optional
+            A number is the mass of a uniform body.
         friction : float, (float, float), or mapping from str or (str, str) to these, optional
             Coulomb's coefficient, or a static and a dynamic one; needs ``orientations="all"``.  It
             is for all contacts, or by name: of a contact, ``"A.v1-floor"``, of a pair of what

@@ -14,7 +14,7 @@ from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice
 from polycorner.bodies.laws import Both, ContactLaws
-from polycorner.bodies.masses import Mass, mass_of
+from polycorner.bodies.masses import Mass, stated_mass
 from polycorner.bodies.neighbours import Pair, pairs
 from polycorner.bodies.pairs import PlacedPart, Touch, both_sharp, distances
 from polycorner.bodies.poses import Placement
@@ -57,8 +57,7 @@ def masses_of(placements: tuple[Placement, ...], density: float, given: Any) -> 
     checks.names("masses", given, [p.name for p in placements])
     found = {}
     for p in placements:
-        mass = given[p.name] if p.name in given else mass_of(p.body, density)
-        checks.instance("masses", mass, Mass, "Mass(1.0, [0.0, 0.0], 0.5)")
+        mass = stated_mass(p.name, p.body, given, density)
         if len(mass.centre) != p.body.dimension:
             refuse("masses", f"a centre of {p.body.dimension} numbers for {p.name!r}", mass.centre)
         if not _as_round_as_the_body(p, mass):

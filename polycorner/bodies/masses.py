@@ -10,8 +10,9 @@ the integrals of ``n`` and ``n n^T`` over the polygon are integrals along its si
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -101,6 +102,20 @@ def mass_of(body: Body, density: float = 1.0) -> Mass:
     planar = len(centre) == 2
     with checks.about("density"):
         return Mass(density * mass, centre, density * (np.trace(second) if planar else inertia))
+
+
+def stated_mass(name: str, body: Body, masses: Mapping[str, Any], density: float) -> Mass:
+    """Return the mass of a body: as stated, of a uniform body of that mass, or of the density."""
+    if name not in masses:
+        return mass_of(body, density)
+    mass = masses[name]
+    if isinstance(mass, Real) and not isinstance(mass, bool):
+        whole = checks.real(f"masses[{name!r}]", mass, above=0)
+        return mass_of(body, whole / mass_of(body).mass)
+    if not isinstance(mass, Mass):
+        expected = "a number, or a Mass, such as Mass(1.0, [0.0, 0.0], 0.5)"
+        refuse(f"masses[{name!r}]", expected, mass, TypeError)
+    return mass
 
 
 @dataclass(frozen=True)

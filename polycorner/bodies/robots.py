@@ -27,7 +27,7 @@ from polycorner.bodies.kernels import together
 from polycorner.bodies.link_parts import CarriedPart, affine, carried_parts, gaps_of, touch
 from polycorner.bodies.link_trees import WORLD, LinkTree
 from polycorner.bodies.links import RobotJoint, RobotLink
-from polycorner.bodies.masses import Mass, mass_of
+from polycorner.bodies.masses import Mass, stated_mass
 from polycorner.bodies.pairs import PlacedPart, Tree, apart
 from polycorner.bodies.poses import Placement, coordinates, frame_of
 from polycorner.bodies.rigid_motions import number
@@ -388,7 +388,7 @@ class Robot(Checked):
         *,
         gravity: ArrayLike | None = None,
         density: float = 1.0,
-        masses: Mapping[str, Mass] | None = None,
+        masses: Mapping[str, Mass | float] | None = None,
         torques: "Mapping[str, sympy.Expr] | None" = None,
         friction: float | Mapping[str, float] = 0.0,
         restitution: float | Mapping[str, float] = 0.0,
@@ -407,8 +407,8 @@ class Robot(Checked):
             Force per mass; default none.
         density : float, optional
             Of free bodies without a mass of their own.
-        masses : mapping from str to Mass, optional
-            Of free bodies.
+        masses : mapping from str to Mass or float, optional
+            Of free bodies; a number is the mass of a uniform body.
         torques : mapping from str to sympy.Expr, optional
             Torque or force of drives by joint, functions of coordinates, velocities and the time
             (:func:`~polycorner.motion.time_symbol`).  Beyond the effort of the joint it is cut off.
@@ -511,7 +511,7 @@ class Robot(Checked):
                 centre = origin + matrix @ link.mass.centre
                 several[carrier].append(Mass(link.mass.mass, centre, inertia))
         for name, body in self.bodies.items():
-            several[name].append(given[name] if name in given else mass_of(body, density))
+            several[name].append(stated_mass(name, body, given, density))
         for carrier in self._tree.steps:
             if not any(several[c] for c in several if carrier in self._tree.path(c)):
                 refuse("links", f"a mass of {carrier!r}, or beyond it", "none")

@@ -119,6 +119,19 @@ def test_a_compound_has_the_inertia_of_its_parts():
     )
 
 
+def test_a_number_is_the_mass_of_a_uniform_body():
+    """A capsule that falls and turns: its kinetic energy is that of the closed form."""
+    a = Arrangement({"A": capsule([-1, 0], [1, 0], 0.5), "B": disc(0.3)}, orientations="all")
+    area = 2.0 + np.pi / 4
+    half = np.pi * 0.5**2 / 2  # a half disc, its centroid 4 r / (3 pi) from the flat side
+    tip = 4 * 0.5 / (3 * np.pi)
+    second = 2 * (2**2 + 1) / 12 + 2 * half * (0.5**2 / 2 - tip**2 + (1 + tip) ** 2)
+    system = a.system(masses={"A": 3.0})
+    state = system.state(a.point({"A": [0, 2], "B": [3, 0]}), [2.0, 0.0, 5.0, 0.0, 0.0, 0.0])
+    kinetic, _ = system.energies(state)
+    assert kinetic == pytest.approx(3.0 * (2.0**2 + second / area * 5.0**2) / 2, rel=1e-12)
+
+
 def run(a, system, placed, v, t_end, dt=1e-3):
     return simulate(system, system.state(a.point(placed), v), t_end, dt)
 
@@ -312,7 +325,11 @@ def masses(mass, centre, inertia):
         (system(gravity=[0, sympy.I * time_symbol()]), ValueError, "gravity: .* of real values"),
         (system(density=0), ValueError, "density"),
         (system(masses={"3": 1}), ValueError, "masses"),
-        (system(masses={"1": 1}), TypeError, "masses"),
+        (system(masses={"1": "heavy"}), TypeError, r"masses\['1'\]: expected a number, or a Mass"),
+        (system(masses={"1": None}), TypeError, r"masses\['1'\]: expected a number, or a Mass"),
+        (system(masses={"1": True}), TypeError, r"masses\['1'\]: expected a number, or a Mass"),
+        (system(masses={"1": -1}), ValueError, r"masses\['1'\]: "),
+        (system(masses={"1": float("inf")}), ValueError, r"masses\['1'\]: "),
         (system(masses={"1": Mass(1, [0.1, 0], 1)}), ValueError, "masses: .* '1' that looks"),
         (system(UPRIGHT, masses={"2": TURNED}), ValueError, "masses: .* '2' that looks the same"),
         (on_the_ground(friction=-1, count=2), ValueError, "friction"),
