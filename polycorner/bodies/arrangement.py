@@ -294,7 +294,7 @@ class Arrangement(Checked, Printed):
         *,
         gravity: ArrayLike | Sequence[Any] | None = None,
         density: float = 1.0,
-        masses: Mapping[str, Mass | float] | None = None,
+        masses: Mapping[str, Any] | None = None,
         friction: Coefficients = 0.0,
         rolling: Coefficients = 0.0,
         restitution: Restitution = 0.0,

@@ -388,7 +388,7 @@ class Robot(Checked):
         *,
         gravity: ArrayLike | None = None,
         density: float = 1.0,
-        masses: Mapping[str, Mass | float] | None = None,
+        masses: Mapping[str, Any] | None = None,
         torques: "Mapping[str, sympy.Expr] | None" = None,
         friction: float | Mapping[str, float] = 0.0,
         restitution: float | Mapping[str, float] = 0.0,
