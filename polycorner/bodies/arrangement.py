@@ -28,7 +28,6 @@ from polycorner.bodies.joints import WORLD, AnyJoint
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
 from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
-from polycorner.bodies.masses import Mass
 from polycorner.bodies.mechanisms import (
     Mechanism,
     check_joints,
