@@ -27,7 +27,6 @@ from polycorner.dumbbells.dynamics.bunch import (
 from polycorner.dumbbells.dynamics.dyads import handedness, minimiser_heading
 from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.dumbbells.pair import Chirality
-from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.motion import EventKind, Noise, simulate
 from polycorner.toolkit import Array
 
@@ -57,7 +56,7 @@ def bunch(
     length, r, t = sizes
     drum = friction.of(replace(DRUM, length=length, ball_radius=r, rod_radius=t))
     drum = drum_for_bunch(drum, count=LEAVING[0], top=top)
-    drum, kicks = disturbed(drum, *noise, seed)
+    drum, kicks = noise.acting_on(drum, seed)
     return follow_bunch(drum, duration, start=seed, noise=kicks, dt=dt)
 
 

@@ -20,7 +20,6 @@ from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from paper_checks.framework.disturbances import ALONG, TEXT, Disturbance, Friction, which
 from polycorner.dumbbells.dynamics.singles import follow, zigzags
 from polycorner.dumbbells.statics.keel import Keel
-from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.motion import Trajectory
 from polycorner.toolkit import Array
 
@@ -44,8 +43,8 @@ def shaken(
     friction: Friction = TEXT,
 ) -> Trajectory:
     """Simulate dumbbells under noise, from the lowest line."""
-    drum, kicks = disturbed(friction.of(DRUM), *noise, 1)
-    dt = 1e-3 if noise.kind == "kicks" else 2e-3
+    drum, kicks = noise.acting_on(friction.of(DRUM), 1)
+    dt = noise.step(2e-3, kicked=1e-3)
     return follow(drum, np.radians(headings), duration, noise=kicks, dt=dt)
 
 

@@ -28,11 +28,12 @@ SETS: tuple[Set, ...] = (
     (CAPTIONS, QUIET, 200.0),
     (CAPTIONS, CHATTER, 300.0),
     (CAPTIONS, STRONGER, 400.0),
+    (TEXT, CHATTER._replace(kicks=30.0), 400.0),
+    (CAPTIONS, CHATTER._replace(kicks=60.0), 400.0),
 )
 OBSERVED = 15.0  # degrees, the heading of dyads of 16 mm
 WITHIN = 2.0  # degrees, of headings
 WIDTH = (4.0, 6.0)  # degrees, of zigzags: "about 5"
-BUNCH_STEPS = {"kicks": 1e-3}  # s, of kinds for which 2 ms are too long
 
 
 class Judged(NamedTuple):
@@ -78,7 +79,7 @@ def judged(friction: Friction, noise: Disturbance, duration: float) -> dict[str,
 
 def _leaving(friction: Friction, noise: Disturbance) -> Judged:
     """Forty of sixty leave, to within ten, most of them in right-handed dyads; one start."""
-    dt = BUNCH_STEPS.get(noise.kind, 2e-3)
+    dt = noise.step(2e-3, kicked=1e-3)
     run = bunch(LARGER, OBSERVED_TIME, 0, SHORTEST, dt, noise, friction)
     left, right = len(run.exits), run.exit_counts()["right"]
     return Judged(abs(left - LEAVING[1]) <= 10 and right >= left / 2, f"{left}, {right} R")

@@ -11,7 +11,6 @@ from paper_checks.appendixA.torque import DRUM
 from paper_checks.framework.disturbances import ALONG, TEXT, Disturbance, Friction
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, follow_pairs
 from polycorner.dumbbells.pair import Chirality
-from polycorner.dumbbells.studies.driven import disturbed
 from polycorner.motion import Noise, Trajectory, simulate
 
 Kind = Literal["end_to_end", "side_by_side"]
@@ -35,7 +34,6 @@ KINDS: tuple[tuple[Disturbance, float], ...] = (
     (KICKED, 400.0),
     (CHATTER, 300.0),
 )  # those by which pairs are judged, and for how long they are kept up, in s
-STEPS = {"kicks": 5e-4}  # s, of kinds for which that of :func:`follow_dyads` is too long
 ANGLES = (-8.0, 2.0, 6.0, 10.0, 14.0)  # degrees, of right-handed pairs; mirrored for left-handed
 ALL: Starts = (*(("R", a) for a in ANGLES), *(("L", -a) for a in ANGLES))
 
@@ -50,9 +48,9 @@ def disturbed_dyads(
 ) -> DyadPaths:
     """Simulate five right-handed and five left-handed nested pairs; angles in degrees."""
     drum = friction.of(replace(DRUM, tilt=math.radians(tilt), length=length))
-    drum, kicks = disturbed(drum, *noise, 1)
+    drum, kicks = noise.acting_on(drum, 1)
     starts = [(hand, math.radians(degrees)) for hand, degrees in ALL]
-    dt = STEPS.get(noise.kind, 2e-3)
+    dt = noise.step(2e-3, kicked=5e-4)
     return follow_dyads(drum, starts, duration, noise=kicks, dt=dt)
 
 

@@ -69,3 +69,14 @@ def test_friction_of_the_text_is_that_of_the_drum_and_captions_have_more_sliding
     assert drum.sliding == pytest.approx((0.1 / np.sin(np.radians(8)), 0.48), abs=2e-3)
     assert drum.rolling == DRUM.rolling
     assert drum.rubbing == (0.1, 0.1)
+
+
+def test_kicks_act_in_addition_to_another_kind_of_noise():
+    both = Disturbance("chatter", 0.4, 0.01, kicks=60.0)
+    drum, noise = both.acting_on(DRUM, 3)
+    alone = Disturbance("kicks", 60.0, 0.003).acting_on(DRUM, 3)[1]
+    assert drum == DRUM
+    assert (noise.chatter, noise.seed) == (0.4, 3)
+    assert (noise.kicks, noise.kick_time) == (alone.kicks, alone.kick_time)
+    assert str(both).startswith("chatter of 0.4 and kicks of 60 mm/s")
+    assert [both._replace(kicks=k).step(2e-3, kicked=1e-3) for k in (0.0, 60.0)] == [2e-3, 1e-3]
