@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from polycorner.toolkit import checks
+
 
 class Verdict(Enum):
     """Outcome of the check of a claim."""
@@ -89,6 +91,7 @@ class Claim:
     def examine(self) -> Finding:
         """Return what the check finds; a simulation alone does not refute what was observed."""
         finding = self.check()
+        checks.instance("check", finding, Finding)
         if self.means is Means.SIMULATION and finding.verdict is Verdict.REFUTED:
             return replace(finding, verdict=Verdict.NOT_REPRODUCED)
         return finding

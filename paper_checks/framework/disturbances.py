@@ -9,7 +9,7 @@ from polycorner.dumbbells.studies.driven import disturbed, kicks_of
 from polycorner.motion import Noise
 
 ALONG = "shaking along"
-HELD = 0.003  # s, for which kicks are held in addition to another kind of noise
+HELD = 0.003  # s, for which kicks are held
 
 
 class Disturbance(NamedTuple):

@@ -17,7 +17,7 @@ from paper_checks.appendixA.forces import STATIC, judged
 from paper_checks.appendixA.torque import DRUM
 from paper_checks.appendixA.turning import turns
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.framework.disturbances import ALONG, TEXT, Disturbance, Friction, which
+from paper_checks.framework.disturbances import ALONG, HELD, TEXT, Disturbance, Friction, which
 from polycorner.dumbbells.dynamics.singles import follow, zigzags
 from polycorner.dumbbells.statics.keel import Keel
 from polycorner.motion import Trajectory
@@ -30,7 +30,7 @@ KINDS = (
     Disturbance(ALONG, 800.0, 0.01),
     Disturbance("shaking across", 2000.0, 0.03),
     Disturbance("shaking up", 3000.0, 0.03),
-    Disturbance("kicks", 40.0, 0.003),
+    Disturbance("kicks", 40.0, HELD),
 )
 START = (15.0, 15.0, -15.0, -15.0, 0.0, 0.0)
 

@@ -7,7 +7,7 @@ from functools import cache, partial
 import numpy as np
 
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
-from paper_checks.framework.disturbances import Disturbance
+from paper_checks.framework.disturbances import HELD, Disturbance
 from paper_checks.section6.experiment import EXPERIMENT
 from polycorner.dumbbells import (
     DumbbellDrum,
@@ -20,9 +20,7 @@ from polycorner.dumbbells.dynamics.dyads import Start, follow_dyads
 from polycorner.dumbbells.pair import Chirality
 from polycorner.dumbbells.statics.depths import Level
 from polycorner.dumbbells.statics.wells import GRAVITY
-from polycorner.dumbbells.studies.driven import disturbed
 
-HOLD = 0.003  # s, for which a kick is held: that of the kicks by which headings are judged
 KICKS = 30.0  # mm/s per sqrt(s), which bring right-handed dyads to the heading that is quoted
 DURATION = 30.0  # s
 ANGLES = (6.0, 8.0, 10.0, 12.0, 14.0)  # degrees, of right-handed pairs; mirrored for left-handed
@@ -100,7 +98,7 @@ def held(kicks: float, friction: float = 1.0, rod: float = EXPERIMENT.rod_radius
         rolling=scaled(DRUM.rolling, friction),
         rubbing=scaled(DRUM.rubbing, friction),
     )
-    drum, noise = disturbed(drum, "kicks", kicks, HOLD, 1)
+    drum, noise = Disturbance("kicks", kicks, HELD).acting_on(drum, 1)
     hands: list[tuple[Chirality, int]] = [("R", 1), ("L", -1)]
     starts: list[Start] = [(hand, sign * math.radians(a)) for hand, sign in hands for a in ANGLES]
     path = follow_dyads(drum, starts, DURATION, noise=noise, dt=STEP)
@@ -117,7 +115,7 @@ def noise_leaves_dyads(kicks: float = KICKS, pair: DumbbellPair = EXPERIMENT) ->
     found = landscape_of(pair)
     if not found.landscape.complete:
         return Finding(Verdict.NOT_TESTABLE, found.landscape.statement)
-    one, noise = strength_of(found), Disturbance("kicks", kicks, HOLD)
+    one, noise = strength_of(found), Disturbance("kicks", kicks, HELD)
     whole, bare = held(kicks), held(kicks, 0.1)
     count = 2 * len(ANGLES)
     holds = whole >= count - 1

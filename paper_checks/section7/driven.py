@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from paper_checks.appendixA.torque import DRUM
-from paper_checks.framework.disturbances import ALONG, TEXT, Disturbance, Friction
+from paper_checks.framework.disturbances import ALONG, HELD, TEXT, Disturbance, Friction
 from polycorner.dumbbells.dynamics.dyads import DyadPaths, follow_dyads, follow_pairs
 from polycorner.dumbbells.pair import Chirality
 from polycorner.motion import Noise, Trajectory, simulate
@@ -23,7 +23,7 @@ APART = 1e4  # mm along the drum, between pairs that are to stay apart
 CHATTER = Disturbance("chatter", 0.4, 0.01)  # turns pairs within minutes
 SHAKEN = Disturbance(ALONG, 600.0, 0.01)  # under which right-handed pairs climb
 HARD = Disturbance(ALONG, 1500.0, 0.01)  # under which pairs of a level drum slip, too
-KICKED = Disturbance("kicks", 30.0, 0.003)
+KICKED = Disturbance("kicks", 30.0, HELD)
 ACROSS = Disturbance("shaking across", 3000.0, 0.03)
 UP = Disturbance("shaking up", 4000.0, 0.03)
 KINDS: tuple[tuple[Disturbance, float], ...] = (
