@@ -340,6 +340,22 @@ def test_a_floating_base_and_free_bodies_move_as_in_an_arrangement():
     assert one.energies(one.state(q, v)) == pytest.approx(two.energies(two.state(q, v)))
 
 
+def test_a_number_is_the_mass_of_a_uniform_free_body():
+    robot = Robot(
+        {"A": RobotLink(sphere(0.2), Mass(1.0, [0, 0, 0], [1, 1, 1]))},
+        {},
+        base="floating",
+        bodies={"B": sphere(0.5)},
+    )
+    system = robot.system(masses={"B": 3.0})
+    q = robot.point({"A": ([0, 0, 0], Rotation.identity()), "B": [2, 0, 0]})
+    v = np.zeros(len(q))
+    v[-3:] = 1.0, 2.0, 2.0
+    assert system.energies(system.state(q, v))[0] == pytest.approx(3.0 * 9.0 / 2)
+    with pytest.raises(TypeError, match=r"masses\['B'\]: expected a number, or a Mass"):
+        robot.system(masses={"B": "heavy"})
+
+
 def test_friction_at_the_floor_slows_a_sliding_ball_as_in_an_arrangement():
     joints = {
         "x": RobotJoint("rail", "cart", "prismatic", axis=[1, 0, 0]),
