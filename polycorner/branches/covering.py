@@ -37,7 +37,9 @@ from polycorner.intervals.balls import (
     constant,
     entries,
     identity,
+    left_inverse,
     matrix,
+    middles,
     midpoints,
 )
 from polycorner.intervals.boxes import BoxFunctions
@@ -72,7 +74,7 @@ def _about(
     setting: Setting, curve: Through, watched: Watched, reach: float, bits: int
 ) -> Tube | None:
     system = CurveSystem(setting, curve.face)
-    middle = np.array([float(b.mid()) for b in curve.at])
+    middle = middles(curve.at)
     found = about_event(system, middle, curve.direction, reach, bits)
     if isinstance(found, Undecided) or not found.contains(curve.at):
         return None
@@ -253,7 +255,7 @@ class Cover:
                 return x
             rows = linear.jacobian[:-1]
             units = np.array(system.units)
-            middle = np.array([[float(b.mid()) for b in row] for row in rows]) * units
+            middle = middles(rows) * units
             if not np.isfinite(middle).all():
                 return x
             backwards = matrix((np.linalg.pinv(middle) * units[:, None]).tolist())
@@ -303,10 +305,9 @@ class Cover:
             return None
         n, d = self.n, system.dimension
         rows = [*(row[d:] for row in linear.jacobian[:n]), linear.jacobian[-2][d:]]
-        middle = np.array([[float(x.mid()) for x in row] for row in rows])
-        if not np.isfinite(middle).all():
+        left = left_inverse(rows)
+        if left is None:
             return None
-        left = matrix(np.linalg.pinv(middle).tolist())
         base = entries(left * column([*[ball(0)] * n, ball(1)]))
         off = (identity(len(base)) - left * matrix(rows)).tolist()
         norm = max(sum((abs(x) for x in row), ball(0)).upper() for row in off)

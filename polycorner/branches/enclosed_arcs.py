@@ -28,7 +28,7 @@ from polycorner.branches.tubes import (
     point,
     tube,
 )
-from polycorner.intervals.balls import ball
+from polycorner.intervals.balls import ball, balls, middles
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import bordered, newton
@@ -206,7 +206,7 @@ def enclosed_arc(
 
 def _time(system: CurveSystem, x: Array) -> float:
     setting = system.setting
-    return float(setting.time([ball(p) for p in x[setting.n : system.dimension].tolist()]).mid())
+    return float(setting.time(balls(x[setting.n : system.dimension])).mid())
 
 
 @dataclass(frozen=True)
@@ -261,10 +261,10 @@ def _between(system: CurveSystem, one: Array, two: Array, bits: int) -> Array | 
     """Return an approximate point of the curve between two of its points."""
     units, middle = np.array(system.units), (one + two) / 2
     pin = system.pinned(((two - one) / units**2).tolist(), middle.tolist())
-    found = newton(pin, [ball(x) for x in middle.tolist()], bits=bits)
+    found = newton(pin, balls(middle), bits=bits)
     if isinstance(found, Undecided):
         return None
-    x = np.array([float(b.mid()) for b in found])
+    x = middles(found)
     near = np.linalg.norm((x - middle) / units) < np.linalg.norm((two - one) / units)
     return x if near else None
 

@@ -25,6 +25,7 @@ from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.intervals.balls import (
     ball,
+    balls,
     column,
     current_precision,
     dot,
@@ -449,7 +450,7 @@ def tube(
 
 def tube_about(system: CurveSystem, middle: Array, reach: float, bits: int) -> Tube | Undecided:
     """Return the tube about an approximate point of the curve, for a reach of the pin."""
-    centre = newton(system, [ball(x) for x in middle.tolist()], [ball(0)], bits=bits)
+    centre = newton(system, balls(middle), [ball(0)], bits=bits)
     if isinstance(centre, Undecided):
         return centre
     cell = Cell([ball(0)], [ball(0, reach)])
@@ -472,7 +473,7 @@ def point(system: Equations, near: "Sequence[Ball]", bits: int) -> Enclosure | U
 def joined(one: Tube, two: Tube, at: Array, bits: int) -> bool:
     """Whether two tubes are pieces of one curve, run through in the same sense near a point."""
     system = one.system.pinned(one.system.normal, at.tolist())
-    shared = point(system, [ball(x) for x in at.tolist()], bits)
+    shared = point(system, balls(at), bits)
     if isinstance(shared, Undecided):
         return False
     # On a whole tube near a branch point the derivative's enclosure is too wide to have a sign.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.intervals.balls import GUARD_BITS, ball, bits_for, precision
+from polycorner.intervals.balls import GUARD_BITS, ball, bits_for, middles, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate, Entrapment
@@ -196,7 +196,7 @@ def _independent(
         values = field.at(box.hull)
         if isinstance(values, Undecided):
             continue
-        vector = np.array([float(x.mid()) for x in values]) / scales
+        vector = middles(values) / scales
         size = float(np.linalg.norm(vector))
         if not 0 < size < np.inf:
             continue

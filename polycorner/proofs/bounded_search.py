@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, bits_for, exact, precision
+from polycorner.intervals.balls import ball, balls, bits_for, exact, middles, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
@@ -133,7 +133,7 @@ class WitnessSearch:
         rows = (*supports, *self.equations, len(self.formulas.names) - 1)
         k, n = len(rows) - 1, self.problem.dimension
         q, lam = list(start), [ball(float(x)) for x in weights]
-        scales = [ball(s) for s in self.scales.tolist()]
+        scales = balls(self.scales)
         normals = [[ball(x) * s for x, s in zip(g.normal, scales, strict=True)] for g in gauges]
         anchor = list(start)
         last, stalled = np.inf, 0
@@ -143,7 +143,7 @@ class WitnessSearch:
             if isinstance(forms, Undecided):
                 return None
             values, gradients = forms.evaluate(box, 1)
-            floats = np.array([float(x.mid()) for x in q])
+            floats = middles(q)
             _, _, curved = self.problem.evaluate(floats, 2)
             scaled = [[g * s for g, s in zip(row, scales, strict=True)] for row in gradients]
             slope = [
@@ -163,7 +163,7 @@ class WitnessSearch:
                 (float(x.mid()) * curved[r] for r, x in zip(rows, lam, strict=False)),
                 np.zeros((n, n)),
             )
-            across = np.array([[float(x.mid()) for x in row] for row in scaled[:k]])
+            across = middles(scaled[:k])
             across = across.reshape(k, n)
             fixed = np.array([[float(x) for x in row] for row in normals]).reshape(-1, n)
             table = np.block(
@@ -198,7 +198,7 @@ class WitnessSearch:
         size = max((abs(x.mid()) for x in values), key=float, default=ball(0))
         if not size > ball(2) ** (-bits // 2):
             return list(contacts)
-        _, gradients = self.problem.evaluate(np.array([float(x.mid()) for x in q]), 1)
+        _, gradients = self.problem.evaluate(middles(q), 1)
         rows, right = gradients[list(contacts)], [float((x.mid() / size).mid()) for x in values]
         fixed = gradients[list(self.equations)]
         found = linprog(
@@ -228,7 +228,7 @@ class WitnessSearch:
             return Undecided(SUBJECT, "no multipliers carry the energy's slope")
         supports, weights = found
         gauges = self._gauges(supports)
-        q = [ball(x) for x in self.point.tolist()]
+        q = balls(self.point)
         for _ in range(3):
             polished = self.polished(supports, weights, gauges, q, bits)
             if polished is None:
@@ -237,7 +237,7 @@ class WitnessSearch:
             kept = self.closing(supports, q, bits)
             if set(kept) == set(supports):
                 break
-            found = self.multipliers(kept, np.array([float(x.mid()) for x in q]))
+            found = self.multipliers(kept, middles(q))
             if found is None:
                 return Undecided(SUBJECT, "no multipliers carry the energy's slope")
             supports, weights = found
@@ -265,7 +265,7 @@ class WitnessSearch:
         read = frozenset().union(*(self.reads(i) for i in held))
         found: list[Gauge] = []
         taken: list[int] = []
-        box = Box([ball(x) for x in self.point.tolist()])
+        box = Box(balls(self.point))
         rows: list[Any] = []
         smooth: list[Generator] = []
         fields = [*self.fields, *self._translations((*supports, *self.equations, energy), box)]

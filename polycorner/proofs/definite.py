@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, matrix
+from polycorner.intervals.balls import ball, matrix, middles
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball, Matrix
@@ -43,7 +43,7 @@ def positive_on_cone(curvature: Rows, rows: Rows, slopes: Rows, scales: Sequence
     if is_definite(_turned(form)):
         return True
     across = matrix([_scaled(row, scales, 1.0) for row in slopes]) * matrix(basis).transpose()
-    weights = _weights(_middle(form), _middle(across))
+    weights = _weights(middles(form.tolist()), middles(across.tolist()))
     if weights is None:
         return False
     shifted = form - across.transpose() * matrix(weights.tolist()) * across
@@ -89,12 +89,8 @@ def _restricted(curvature: Rows, basis: Rows, scales: Sequence[float]) -> "Matri
     return across * hessian * across.transpose()
 
 
-def _middle(form: "Matrix") -> "Array":
-    return np.array([[float(x.mid()) for x in row] for row in form.tolist()])
-
-
 def _turned(form: "Matrix") -> "list[list[Ball]]":
-    middle = _middle(form)
+    middle = middles(form.tolist())
     if np.isfinite(middle).all():
         turn = matrix(np.linalg.eigh((middle + middle.T) / 2)[1].tolist())
         form = turn.transpose() * form * turn

@@ -13,6 +13,7 @@ import numpy as np
 from polycorner import checks
 from polycorner.intervals.balls import (
     ball,
+    balls,
     between,
     bounds,
     column,
@@ -302,7 +303,7 @@ def check_unchanged(certificate: Certificate, formulas: Formulas) -> None:
     seen, gradients = problem.evaluate(point, 1)
     rows = range(problem.rows)
     with precision(CHECK_BITS):
-        now = formulas.values(Box([ball(x) for x in point.tolist()]), rows)
+        now = formulas.values(Box(balls(point)), rows)
     sizes = 1 + abs(seen) + np.nan_to_num(abs(gradients).max(axis=1), nan=np.inf, posinf=np.inf)
     for name, before, value, size in zip(formulas.names, seen, now, sizes, strict=True):
         if not (isfinite(before) and value.is_finite() and isfinite(size)):

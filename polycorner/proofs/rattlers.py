@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, exact
+from polycorner.intervals.balls import ball, exact, middles
 from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
@@ -101,7 +101,7 @@ class Rattlers:
         hull : list of Ball
             All coordinates; the others are enclosed, those that rattle are where they are.
         """
-        q = self._middle(np.array([float(x.mid()) for x in hull]))
+        q = self._middle(middles(hull))
         centre = [exact(x.mid()) for x in hull]
         for j in self.coordinates:
             centre[j] = Fraction(q[j])

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, exact, precision, solve_exactly
+from polycorner.intervals.balls import ball, exact, middles, precision, solve_exactly
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
@@ -364,7 +364,7 @@ class Repair:
         values, _ = forms.evaluate(Box(part.centre), 1)
         _, gradients = forms.evaluate(part.box, 1)
         halves = np.array([float(half) for half in part.halves])
-        middle = np.array([[float(x.mid()) for x in row] for row in gradients])
+        middle = middles(gradients)
         middle = middle.reshape(len(kept), len(halves)) * halves
         spread = np.array([[float(x.rad()) for x in row] for row in gradients])
         spread = spread.reshape(middle.shape) * halves
@@ -372,7 +372,7 @@ class Repair:
         if not np.isfinite(spread.sum() + sizes.sum()) or not sizes.any():
             return int(halves.argmax())
         sizes[sizes == 0] = 1.0
-        levels = np.array([float(x.mid()) for x in values]) / sizes
+        levels = middles(values) / sizes
         both = [i for i, row in enumerate(kept) if row in self.place.equations]
         table = np.vstack([middle / sizes[:, None], -(middle / sizes[:, None])[both]])
         heights = np.concatenate([levels, -levels[both]])

@@ -40,7 +40,7 @@ from typing import TYPE_CHECKING
 from polycorner import checks
 from polycorner.intervals.balls import (
     MOST_DIGITS,
-    ball,
+    balls,
     between,
     bounds,
     decimals,
@@ -213,7 +213,7 @@ def _at_once(
 def _outside(certificate: Certificate, formulas: Formulas) -> dict[str, str]:
     """Return what the certificate's point violates, taken exactly, in the best branch."""
     d, m = certificate.problem.polyhedron, certificate.problem.inequalities
-    point = Box([ball(x) for x in certificate.point.tolist()])
+    point = Box(balls(certificate.point))
     values = formulas.values(point, range(m + len(d.equations)))
     broken = [i for i, value in enumerate(values) if (value < 0 if i < m else value != 0)]
     signs = [-1 if i in broken else 1 for i in range(m)]

@@ -37,7 +37,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, column, dot, entries, matrix, precision
+from polycorner.intervals.balls import ball, column, dot, entries, matrix, middles, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
@@ -132,8 +132,8 @@ def _within(
     if isinstance(forms, Undecided):
         return None
     slopes = [[g[i] for i in free] for g in forms.evaluate(Box(point), 1)[1]]
-    middles = np.array([[float(x.mid()) for x in g] for g in slopes])
-    guess = _guessed(middles, faces.scales[free]) if np.isfinite(middles).all() else None
+    known = middles(slopes)
+    guess = _guessed(known, faces.scales[free]) if np.isfinite(known).all() else None
     if guess is None:
         return None
     steps, weights = guess
@@ -141,7 +141,7 @@ def _within(
     exact = _corrected(slopes, steps, weights)
     if exact is None:
         return None
-    middle, radii = np.array([float(x.mid()) for x in point]), np.zeros_like(faces.scales)
+    middle, radii = middles(point), np.zeros_like(faces.scales)
     radii[free] = min(widest, SEARCH.widest) * faces.scales[free]
     for _ in range(SHRINKINGS):
         lower, upper = middle - radii, middle + radii

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, dot, precision
+from polycorner.intervals.balls import ball, balls, dot, middles, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import polynomials as algebra
@@ -109,12 +109,12 @@ def _approximate(faces: EnclosedFaces, q: Array, open_: Sequence[int]) -> Array 
     free, rows = list(faces.free), faces.rows(open_)
     q = q.copy()
     for _ in range(MOST_STEPS):
-        forms = faces.formulas.smooth(Box([ball(x) for x in q.tolist()]), rows)
+        forms = faces.formulas.smooth(Box(balls(q)), rows)
         if isinstance(forms, Undecided):
             return None
-        values, gradients = forms.evaluate(Box([ball(x) for x in q.tolist()]), 1)
+        values, gradients = forms.evaluate(Box(balls(q)), 1)
         slopes = np.array([[float(g[i].mid()) for i in free] for g in gradients])
-        missed = np.array([float(x.mid()) for x in values])
+        missed = middles(values)
         if not (np.isfinite(slopes).all() and np.isfinite(missed).all()):
             return None
         # Dependent gradients: convergence is linear, and least squares takes the shortest step.
