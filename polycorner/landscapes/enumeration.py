@@ -22,6 +22,7 @@ from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.critical import critical_points, minima_on
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.enumeration import Limits
+from polycorner.proofs.lists.tree import bisected
 from polycorner.tolerances import SEARCH
 
 if TYPE_CHECKING:
@@ -225,9 +226,5 @@ def _misses(
         sides = (upper - lower) / units
         if len(lower) and (sides.max(axis=1) <= 0).any():
             return False  # a point that may be in the set
-        each, split = np.arange(len(lower)), sides.argmax(axis=1)
-        middle = 0.5 * (lower + upper)[each, split]
-        first, second = upper.copy(), lower.copy()
-        first[each, split] = second[each, split] = middle
-        lower, upper = np.concatenate([lower, second]), np.concatenate([first, upper])
+        lower, upper = bisected(lower, upper, sides.argmax(axis=1))
     return not len(lower)

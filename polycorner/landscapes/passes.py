@@ -37,7 +37,7 @@ undecided, is taken to join everything, from the least energy it may have: bound
 all the same.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -89,6 +89,11 @@ class PossiblePass:
     energy: Bounds
     starts: list[tuple[bool, frozenset[int], Array]] = field(default_factory=list)
     sides: list[Side] = field(default_factory=list)
+
+    def told(self, sides: Iterable[Side]) -> Pass:
+        """Return the pass with its sides."""
+        about = self.spot.middle, self.energy, self.active, self.index, self.kind
+        return Pass(*about, tuple(sides), self.orbit)
 
 
 @dataclass
@@ -298,8 +303,7 @@ class Sorted:
         domain = self.found.domain
         for number, place in enumerate(self.found.loci):
             z = list(place.z)
-            lower, upper = domain.lower.copy(), domain.upper.copy()
-            lower[z], upper[z] = place.sharp_lower, place.sharp_upper
+            lower, upper = place.sides(domain)
             if not self._asked(lower, upper):
                 continue
             if place.sample is None:
@@ -390,19 +394,13 @@ class Sorted:
             if image is not None:
                 yield image
                 continue
-            sides = [
-                *one.sides,
-                *(
-                    Side(None) if stopped() else self._side(one, start, targets)
-                    for start in one.starts
-                ),
-            ]
+            found = (
+                Side(None) if stopped() else self._side(one, start, targets) for start in one.starts
+            )
+            sides = [*one.sides, *found]
             if one.kind == "exit" and not one.starts:
                 sides = []
-            new = Pass(
-                one.spot.middle, one.energy, one.active, one.index, one.kind, tuple(sides),
-                one.orbit,
-            )  # fmt: skip
+            new = one.told(sides)
             if one.orbit >= 0:
                 known.setdefault((one.orbit, one.kind), new)
             yield new
@@ -470,10 +468,7 @@ class Sorted:
                         return None
                     path = np.array([g(q, manifold) for q in side.route.vertices])
                     sides.append(Side(there, replace(side.route, vertices=unwound(manifold, path))))
-                return Pass(
-                    one.spot.middle, one.energy, one.active, one.index, one.kind, tuple(sides),
-                    one.orbit,
-                )  # fmt: skip
+                return one.told(sides)
         return None
 
 

@@ -26,6 +26,7 @@ from polycorner.proofs.lists.faces import (
 )
 from polycorner.proofs.lists.known import Setting, Tried
 from polycorner.proofs.lists.loci import locus, met
+from polycorner.proofs.lists.tree import Batch
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, SEARCH
 
@@ -319,7 +320,7 @@ class Screen:
 
 
 @dataclass
-class Starts:
+class Starts(Batch):
     """Points to start from.
 
     With the functions that seem active there, the widest regions to try, and whether the energy's
@@ -330,20 +331,6 @@ class Starts:
     active: Mask
     widest: Array
     still: Mask
-
-    def part(self, keep: NDArray[np.intp]) -> "Starts":
-        """Return some of them."""
-        return Starts(self.q[keep], self.active[keep], self.widest[keep], self.still[keep])
-
-    @classmethod
-    def joined(cls, parts: "Sequence[Starts]") -> "Starts":
-        """Return some starts, one or more, together."""
-        return cls(
-            np.concatenate([p.q for p in parts]),
-            np.concatenate([p.active for p in parts]),
-            np.concatenate([p.widest for p in parts]),
-            np.concatenate([p.still for p in parts]),
-        )
 
 
 @dataclass
