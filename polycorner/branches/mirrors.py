@@ -70,14 +70,8 @@ class Mirror:
     ) -> "Mirror | None":
         """Return what an image is on a face; None unless it is an involution there.
 
-        Parameters
-        ----------
-        g : Image
-        face : tuple of int
-        dimension : int
-            Of coordinates and parameters, which come before the multipliers.
-        equations : sequence of int
-            Numbers of the equations that are held.
+        ``dimension`` coordinates and parameters come before the multipliers; ``equations`` are the
+        numbers of those that are held.
         """
         n, moved = len(g.order), [g.functions[i] for i in face]
         turned = [g.equations[j] for j in equations]
@@ -151,15 +145,8 @@ def _halved(x: "Sequence[Ball]", pairs: tuple[tuple[int, int, int], ...]) -> "li
 def images(lifted: Problem, symmetry: Symmetry, diagram: Diagram, most: int) -> list[Image]:
     """Return finite symmetries for all values of the parameters: those given, those found.
 
-    Parameters
-    ----------
-    lifted : Problem
-        With the formulas' parameters as further coordinates.
-    symmetry : Symmetry
-    diagram : Diagram
-        Whose branch points suggest others.
-    most : int
-        Signed permutations that are tried for two arcs, at most.
+    ``lifted`` has the formulas' parameters as further coordinates.  Branch points of the diagram
+    suggest what is found, by ``most`` signed permutations for two arcs at most.
 
     Raises
     ------

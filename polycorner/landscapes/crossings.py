@@ -248,16 +248,8 @@ def _tip(
 def sides_of(problem: Problem, certificate: Certificate) -> tuple[Array, ...]:
     """Return points a little below a pass, one on each side of it, in the polyhedron.
 
-    Parameters
-    ----------
-    problem : Problem
-    certificate : Certificate
-        Of the pass.
-
-    Returns
-    -------
-    tuple of (n,) arrays
-        Two or more; none where the point is no pass, or not seen to be one.
+    Two or more, ``(n,)`` each; none where the certificate's point is no pass, or not seen to be
+    one.
     """
     found = crossing_at(problem, certificate.point, certificate.tolerances)
     walks = Walks(problem, orbits_of(problem, None), certificate.tolerances)

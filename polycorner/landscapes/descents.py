@@ -222,13 +222,8 @@ class Descents:
     ) -> tuple[int, Route] | None:
         """Return the minimum that a descent ends in, by its number, and the way; None if none.
 
-        Parameters
-        ----------
-        begun : sequence of Spot
-            The first points, the last of them off all walls.
-        start : Spot
-            The pass, below which the route has to stay.
-        targets : sequence of Target
+        The first points of the way have begun at the pass ``start``, below which it has to stay,
+        and the last of them is off all walls.
         """
         with precision(BITS):
             height = self.curves.value(start.box)

@@ -142,14 +142,7 @@ def number_of(x: Fraction) -> str:
 def examine(problem: Problem, formulas: Formulas, witness: Witness) -> "BoundedMinimum | Undecided":
     """Return the minimum that a witness shows, or the hypothesis that is not shown.
 
-    Parameters
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    formulas : Formulas
-        Its inequalities, equations and energy, in this order.
-    witness : Witness
-        Points, weights and boxes; see the module.
+    ``formulas`` are those of the inequalities, the equations and the energy, in this order.
     """
     try:
         return _examined(Examination(problem, formulas, witness))

@@ -103,16 +103,9 @@ def cover(
 ) -> tuple[ParameterCell, ...]:
     """Divide a box of parameters into cells until all are decided or ``max_cells`` are reached.
 
-    Parameters
-    ----------
-    claim : Claim
-        Whose system has the parameters as inputs, in the order of ``sides``.
-    start : list of Ball
-        The unknowns at the parameters ``at``.
-    sides : mapping from str to (float, float)
-        The box.
-    progress : callable, optional
-        Called with the decided fraction of the box, 1, and the number of cells.
+    The claim's system has the parameters as inputs, in the order of ``sides``; ``start`` are the
+    unknowns at the parameters ``at``.  Progress is told the decided fraction of the box, 1, and the
+    number of cells.
     """
     names, whole = tuple(sides), prod(upper - lower for lower, upper in sides.values())
     order = count()

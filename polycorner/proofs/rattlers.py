@@ -94,12 +94,8 @@ class Rattlers:
         """Return a centre and half sides of the room, in scale units, or None where none is shown.
 
         All sides grow alike first, then one after the other, while the functions that read these
-        coordinates are positive.
-
-        Parameters
-        ----------
-        hull : list of Ball
-            All coordinates; the others are enclosed, those that rattle are where they are.
+        coordinates are positive.  Of all coordinates in ``hull`` the others are enclosed; those
+        that rattle are where they are.
         """
         q = self._middle(middles(hull))
         centre = [exact(x.mid()) for x in hull]

@@ -56,11 +56,7 @@ class Symbols:
     def algebraic(self, coefficients: Sequence[int], near: "Ball") -> Polynomial | None:
         """Return the symbol of the real root in a ball, if there is one and no other root is near.
 
-        Parameters
-        ----------
-        coefficients : sequence of int
-            Of the polynomial, the constant first; the last is not 0.
-        near : Ball
+        The constant coefficient comes first; the last is not 0.
         """
         every = roots(tuple(coefficients), current_precision())
         alike = [x for x in every if x.real.overlaps(near)]

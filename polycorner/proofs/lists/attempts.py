@@ -193,12 +193,7 @@ def newton(
 def active_sets(weights: Array, pulls: Array) -> Mask:
     """Return the functions ``(B, m)`` that balance the energy in nearest combinations.
 
-    Parameters
-    ----------
-    weights : (B, m + 1) array
-        Weights of the gradients, the energy's last.
-    pulls : (B, m + 1) array
-        Lengths of the gradients.
+    From the weights and the lengths of the gradients, ``(B, m + 1)`` each, the energy's last.
     """
     forces = weights * pulls
     most = forces.max(axis=1, keepdims=True, initial=0.0)

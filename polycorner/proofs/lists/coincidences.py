@@ -135,14 +135,8 @@ def active_at(conj: "Mask", found: Sequence[int]) -> tuple[int, ...] | None:
     """Return the functions that vanish at a point and matter for the set near it.
 
     The set is near the point a union of pieces, where functions that vanish are not negative; a
-    piece inside another does not matter.  None outside the set.
-
-    Parameters
-    ----------
-    conj : (c, m) array
-        The set as a union of intersections.
-    found : sequence of int
-        Signs, all of them decided.
+    piece inside another does not matter.  None outside the set.  ``conj`` is the set as a union of
+    intersections ``(c, m)``; all signs are decided.
     """
     at = np.array(found)
     pieces = [

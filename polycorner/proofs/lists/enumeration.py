@@ -100,13 +100,8 @@ def _extended(symmetry: Symmetry | None, n: int, count: int) -> Symmetry | None:
 def unreached(formulas: Formulas, domain: Domain, fields: Sequence[object]) -> list[int]:
     """Return the fixed coordinates whose values not every orbit is shown to reach.
 
-    Parameters
-    ----------
-    formulas : Formulas
-        All functions of the problem.
-    domain : Domain
-    fields : sequence of vector fields
-        Declared symmetries; translations are found without being declared.
+    ``formulas`` are all functions of the problem, ``fields`` the declared symmetries; translations
+    are found without being declared.
     """
     left = list(domain.fixed)
     if not left:

@@ -82,16 +82,9 @@ class Pinned(Region):
 def pinned(faces: EnclosedFaces, q: Array, slopes: Array, widest: float) -> Pinned | None:
     """Return the widest box tried about a point at which some functions vanish, or None.
 
-    Parameters
-    ----------
-    faces : EnclosedFaces
-    q : (n,) array
-        The point, approximately.
-    slopes : (m, n) array
-        Scaled gradients of the functions there, in the free coordinates; 0 of those that do not
-        vanish.
-    widest : float
-        Largest reach of the box, in scale units.
+    ``slopes`` are the scaled gradients of the functions at the point, nearly, in the free
+    coordinates, 0 of those that do not vanish, ``(m, n)``; ``widest`` is the largest reach of the
+    box, in scale units.
     """
     corner = _independent(slopes)
     if corner is None:

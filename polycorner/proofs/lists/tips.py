@@ -69,14 +69,8 @@ class TipRegion(Region):
 def tips(faces: EnclosedFaces, q: Array, open_: Sequence[int], reach: float) -> Iterator[TipRegion]:
     """Yield boxes about a singular corner near ``q``, for each set of functions that isolates it.
 
-    Parameters
-    ----------
-    faces : EnclosedFaces
-    q : (n,) array
-    open_ : sequence of int
-        Inequalities that may vanish there.
-    reach : float
-        How far the corner may be, in scale units.
+    ``open_`` are the inequalities that may vanish there, ``reach`` is how far the corner may be, in
+    scale units.
     """
     with precision(BITS):
         # An exact point must be guessed: an enclosure never shows that gradients are dependent.
