@@ -214,7 +214,6 @@ def prove_branches(
     TypeError, ValueError
         For diagrams of unions and on manifolds with unit vectors.
     """
-    checks.instance("diagram", diagram, Diagram)
     d = diagram.problem.polyhedron
     if d.is_union or d.manifold.factors or diagram.problem.is_sparse:
         expected = "one of an intersection, on lines and circles, of few coordinates"

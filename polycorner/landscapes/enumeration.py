@@ -12,6 +12,7 @@ from polycorner import checks
 from polycorner.formulas.periodicity import check_function
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.boxes import BoxFunctions
+from polycorner.kinds import checked
 from polycorner.landscapes.barriers import Landscape
 from polycorner.landscapes.convex import convex_landscape
 from polycorner.landscapes.curves import Curves
@@ -32,6 +33,7 @@ MOST_BOXES = 20_000  # with which a side of a box is shown to miss the set
 BEYOND = 1 / 64  # of a side that is a wall, by which boxes reach beyond it
 
 
+@checked
 def landscape(
     polyhedron: Polyhedron,
     energy: "Energy",
@@ -97,8 +99,6 @@ def landscape(
     checks.real("cap", cap, above=-inf, infinite=True)
     posed = pose(polyhedron, energy)
     whole = domain(polyhedron.manifold, box)
-    if symmetry is not None:
-        checks.instance("symmetry", symmetry, Symmetry)
     checks.real("resolution", resolution, above=0)
     limits = Limits(max_boxes, max_seconds, workers, progress)
     limited = _limited(polyhedron, region)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.landscapes.barriers import Landscape, Minimum, Pass, Side
 from polycorner.landscapes.crossings import Junction, crossing_at, orbits_of, sides_of, starts_of
 from polycorner.landscapes.routes import Route
@@ -30,7 +31,6 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, TOLERANCE, Tolerances
 
@@ -357,7 +357,7 @@ def _minimum(node: FoundMinimum) -> Minimum:
     return Minimum(node.point, (found.energy, found.energy), found.active, kind, node.orbit)
 
 
-@shown
+@checked
 def search_landscape(  # noqa: PLR0913 - all but two are options
     polyhedron: Polyhedron,
     energy: "Energy",
@@ -417,11 +417,7 @@ def search_landscape(  # noqa: PLR0913 - all but two are options
     """
     tolerances = Tolerances.of(tolerance, rank_tolerance)
     problem = pose(polyhedron, energy)
-    if symmetry is not None:
-        checks.instance("symmetry", symmetry, Symmetry)
     checks.real("cap", cap, infinite=True)
-    if not callable(progress):
-        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
     problem.check_size()
     if problem.is_sparse:
         checks.refuse("polyhedron", "one of few coordinates", problem.dimension)

@@ -49,6 +49,7 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Verdict
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
@@ -73,7 +74,6 @@ from polycorner.proofs.parameter_boxes import (
 from polycorner.proofs.proof import DOUBLE_DIGITS, Bounds, Proof
 from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.proofs.witnesses import Gauge
-from polycorner.signatures import shown
 
 if TYPE_CHECKING:
     pass
@@ -88,7 +88,7 @@ ROOM, ROOM_DIGITS = "room", 6
 BOX_DIGITS = 3  # digits beyond those of the enclosures, for the box that contains them
 
 
-@shown
+@checked
 def prove(
     certificate: Certificate,
     *,
@@ -151,13 +151,8 @@ def prove(
     >>> p.proved, p.enclosures["multiplier bowl"]
     (True, ('1.0000000', '1.0000000'))
     """
-    checks.instance("certificate", certificate, Certificate)
     checks.whole("digits", digits, least=1, most=MOST_DIGITS)
     checks.whole("max_cells", max_cells, least=1, most=MOST_CELLS)
-    if symmetry is not None:
-        checks.instance("symmetry", symmetry, Symmetry)
-    if not callable(progress):
-        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
     problem = certificate.problem
     d = problem.polyhedron
     fields = generators(d.manifold, symmetry.fields if symmetry else ())

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from polycorner import checks
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -290,6 +289,7 @@ def with_images(
         orbit += 1
 
 
+@checked
 def corners(
     polyhedron: Polyhedron,
     *,
@@ -347,7 +347,6 @@ def corners(
     """
     import sympy
 
-    checks.instance("polyhedron", polyhedron, Polyhedron)
     nothing = sympy.Integer(0)
     search = begun(CornerSearch, polyhedron, nothing, box, symmetry, resolution)
     limits = Limits(max_boxes, max_seconds, workers, progress)
