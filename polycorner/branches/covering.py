@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.branches.enclosed_arcs import EnclosedArc, Watched
+from polycorner.branches.enclosed_arcs import Watched
 from polycorner.branches.enclosed_events import EnclosedEvent, Through, about_event
 from polycorner.branches.pitchforks import Pitchfork
 from polycorner.branches.proof_options import BranchProofOptions
@@ -340,17 +340,3 @@ def _outward(x: Fraction) -> tuple[float, float]:
     near = float(x)
     exact = Fraction(near) == x
     return (near, near) if exact else (np.nextafter(near, -np.inf), np.nextafter(near, np.inf))
-
-
-def all_tubes(
-    setting: Setting,
-    arcs: Sequence[EnclosedArc],
-    events: Sequence[EnclosedEvent],
-    watched: Watched,
-    options: BranchProofOptions,
-) -> list[Tube]:
-    """Return the tubes of arcs, and those about events."""
-    found = [one for arc in arcs for one in arc.tubes]
-    for event in events:
-        found += event_tubes(setting, event, watched, options)
-    return found

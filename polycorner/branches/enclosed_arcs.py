@@ -39,40 +39,17 @@ if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball
 
 
-@dataclass(frozen=True)
 class Watched:
-    """What is watched, by number: functions, then the energy's multiplier and the parameter.
+    """What is watched, by number: functions, then what follows them.
 
-    Attributes
-    ----------
-    inequalities : int
-    low, high : Fraction
-        The interval of the parameter.
+    These are the energy's multiplier, the distances of the parameter from the start and the end of
+    its interval, which are ``low`` and ``high``, and its derivative, ``turn``.
     """
 
-    inequalities: int
-    low: Fraction
-    high: Fraction
-
-    @property
-    def energy(self) -> int:
-        """The energy's multiplier."""
-        return self.inequalities
-
-    @property
-    def start(self) -> int:
-        """The distance of the parameter from the start of its interval."""
-        return self.inequalities + 1
-
-    @property
-    def end(self) -> int:
-        """Its distance from the end."""
-        return self.inequalities + 2
-
-    @property
-    def turn(self) -> int:
-        """Its derivative."""
-        return self.inequalities + 3
+    def __init__(self, inequalities: int, low: Fraction, high: Fraction) -> None:
+        m = inequalities
+        self.inequalities, self.low, self.high = m, low, high
+        self.energy, self.start, self.end, self.turn = m, m + 1, m + 2, m + 3
 
     def at(self, setting: Setting, face: Face, x: "Sequence[Ball]") -> "list[Ball]":
         """Return enclosures of all that is watched but the derivative, on a box of unknowns."""

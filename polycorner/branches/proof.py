@@ -4,13 +4,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from polycorner import checks
-from polycorner.branches.covering import Cover, all_tubes
+from polycorner.branches.covering import Cover, event_tubes
 from polycorner.branches.diagram import Arc, BranchEvent, BranchKind, Diagram
 from polycorner.branches.enclosed_arcs import EnclosedArc, Watched, enclosed_arc
 from polycorner.branches.enclosed_events import (
@@ -424,7 +425,10 @@ class _Prover:
         """Return boxes in which there may be equilibria that are not on the arcs."""
         interval = self.diagram.interval
         tubes: list[Tube | Pitchfork] = [
-            *all_tubes(self.setting, arcs, events, self.watched, self.options),
+            *(tube for arc in arcs for tube in arc.tubes),
+            *chain.from_iterable(
+                event_tubes(self.setting, event, self.watched, self.options) for event in events
+            ),
             *(one for one in self.pitchforks.values() if isinstance(one, Pitchfork)),
         ]
         lifted = lifted_problem(self.problem, tuple(self.diagram.rates))

@@ -39,7 +39,7 @@ all the same.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from scipy.optimize import linprog
@@ -62,6 +62,14 @@ from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
     from polycorner.proofs.lists.images import Motion
+
+
+# Whether a way bends down, what is held or rises along it, and its direction, scaled.
+Start: TypeAlias = tuple[bool, frozenset[int], Array]
+
+
+def _both(held: frozenset[int], way: Array | None) -> list[Start]:
+    return [] if way is None else [(True, held, way), (True, held, -way)]
 
 
 @dataclass
@@ -87,7 +95,7 @@ class PossiblePass:
     kind: Kind
     orbit: int
     energy: Bounds
-    starts: list[tuple[bool, frozenset[int], Array]] = field(default_factory=list)
+    starts: list[Start] = field(default_factory=list)
     sides: list[Side] = field(default_factory=list)
 
     def told(self, sides: Iterable[Side]) -> Pass:
@@ -166,7 +174,9 @@ class Sorted:
 
     def energy(self, spot: Spot) -> Bounds:
         """Return bounds of the energy on a box."""
-        return bounds_of(self.curves, spot)
+        with precision(BITS):
+            value = self.curves.value(spot.box)
+            return (under(value), above(value)) if value.is_finite() else (-np.inf, np.inf)
 
     def _asked(self, lower: Array, upper: Array) -> bool:
         return self.energy(self.spot(lower, upper, frozenset()))[0] <= self.cap
@@ -199,23 +209,15 @@ class Sorted:
 
     def _signs(self, spot: Spot) -> list[int | None]:
         """Return the signs of all inequalities at a point, None for those that are not decided."""
-        low, high = self.functions.values(
-            *(np.array([[f(x) for x in spot.box]]) for f in (under, above))
-        )
+        ends = (np.array([[f(x) for x in spot.box]]) for f in (under, above))
+        low, high = self.functions.values(*ends)
         with precision(BITS):
-            values = self.curves.formulas.values(
-                Box(list(spot.box)), range(self.problem.inequalities)
-            )
-            return [
-                0
-                if i in spot.zeros
-                else 1
-                if v > 0 or low[0, i] > 0
-                else -1
-                if v < 0 or high[0, i] < 0
-                else None
-                for i, v in enumerate(values)
-            ]
+            rows = range(self.problem.inequalities)
+            values = self.curves.formulas.values(Box(list(spot.box)), rows)
+        return [
+            0 if i in spot.zeros else 1 if v > 0 or a > 0 else -1 if v < 0 or b < 0 else None
+            for i, (v, a, b) in enumerate(zip(values, low[0], high[0], strict=False))
+        ]
 
     def _regular(
         self, spot: Spot, one: CriticalMember, held: frozenset[int], pieces: Sequence[Piece]
@@ -228,7 +230,7 @@ class Sorted:
         if len(pieces) == 1:
             if p.index == 1:
                 way = self._downwards(spot, held)
-                starts = [] if way is None else [(True, held, way), (True, held, -way)]
+                starts = _both(held, way)
                 new = PossiblePass(*about, "saddle", p.orbit, self.energy(spot), starts)
                 self.candidates.append(new)
         elif p.index == 0:
@@ -326,13 +328,8 @@ class Sorted:
                     self.nodes.append(ListedMinimum(new, target))
                 else:
                     way = self._unstable(spot, z)
-                    starts = [] if way is None else [
-                        (True, frozenset[int](), way), (True, frozenset[int](), -way)
-                    ]  # fmt: skip
-                    energy = self.energy(spot)
-                    self.candidates.append(
-                        PossiblePass(spot, (), 1, "locus", orbit, energy, starts)
-                    )
+                    about = self.energy(spot), _both(frozenset(), way)
+                    self.candidates.append(PossiblePass(spot, (), 1, "locus", orbit, *about))
 
     def _unstable(self, spot: Spot, z: Sequence[int]) -> Array | None:
         bends = self.problem.evaluate(spot.middle, 2)[2][-1]
@@ -408,7 +405,7 @@ class Sorted:
     def _side(
         self,
         one: PossiblePass,
-        start: tuple[bool, frozenset[int], Array],
+        start: Start,
         targets: Sequence[Target],
     ) -> Side:
         bent, held, way = start
@@ -470,12 +467,3 @@ class Sorted:
                     sides.append(Side(there, replace(side.route, vertices=unwound(manifold, path))))
                 return one.told(sides)
         return None
-
-
-def bounds_of(curves: Curves, spot: Spot) -> Bounds:
-    """Return bounds of the energy on a box, as doubles."""
-    with precision(BITS):
-        value = curves.value(spot.box)
-        if not value.is_finite():
-            return -np.inf, np.inf
-        return under(value), above(value)

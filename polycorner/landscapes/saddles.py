@@ -7,7 +7,7 @@ multipliers and curvatures; with multipliers that are zero by the copositivity o
 complement; in a union by the pieces that meet, at minima on the intersections of two branches.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf
@@ -322,16 +322,12 @@ class Lows:
             yield Pass(
                 point=point,
                 energy=(found.energy, found.energy),
-                active=tuple(self._names(found.stratum.active, group[k].names)),
+                active=tuple(group[k].names.get(name, name) for name in found.stratum.active),
                 index=crossing.index,
                 kind=crossing.kind,
                 sides=tuple(self._side(end, path, nodes) for end, path in carried),
                 orbit=orbit,
             )
-
-    @staticmethod
-    def _names(active: Iterable[str], renaming: Mapping[str, str]) -> list[str]:
-        return [renaming.get(name, name) for name in active]
 
     def _side(self, end: Locus | None, path: Array, nodes: Sequence[FoundMinimum]) -> Side:
         """Return a side with its minimum, and its route if that leads to the minimum listed."""

@@ -371,7 +371,7 @@ def _distance(certificate: Certificate, z: "list[Ball]") -> float:
     return max(abs(float(x) - float(q)) / float(s) for x, q, s in pairs)
 
 
-def _sharp(enclosure: Enclosure, digits: int, *, least: float = 1e-10) -> bool:
+def _sharp(enclosure: Enclosure, digits: int) -> bool:
     """Whether every unknown is enclosed to ``digits`` digits, relative to itself.
 
     Where it is smaller than ``least`` units, they are relative to its unit.
@@ -379,7 +379,7 @@ def _sharp(enclosure: Enclosure, digits: int, *, least: float = 1e-10) -> bool:
     units = enclosure.predictor.system.units
     small = ball(10) ** -digits
     return all(
-        x.rad() <= small * (x.abs_lower() + least * unit)
+        x.rad() <= small * (x.abs_lower() + 1e-10 * unit)
         for x, unit in zip(enclosure.solution, units, strict=True)
     )
 

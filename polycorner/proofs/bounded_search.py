@@ -210,10 +210,6 @@ class WitnessSearch:
         gaps = rows @ found.x + right
         return [i for i, gap in zip(contacts, gaps.tolist(), strict=True) if gap < 1e-6]
 
-    def reads(self, row: int) -> frozenset[int]:
-        """Return the coordinates that a function depends on."""
-        return reads(self.formulas, row)
-
     # ------------------------------------------------------------------------------- the witness
 
     def run(self, digits: int) -> BoundedMinimum | Undecided:
@@ -262,7 +258,7 @@ class WitnessSearch:
         """Return a section for each field, along one coordinate of the core."""
         energy = len(self.formulas.names) - 1
         held = (*supports, *self.equations, energy)
-        read = frozenset().union(*(self.reads(i) for i in held))
+        read = frozenset().union(*(reads(self.formulas, i) for i in held))
         found: list[Gauge] = []
         taken: list[int] = []
         box = Box(balls(self.point))

@@ -70,7 +70,6 @@ from polycorner.values import cached_property
 
 if TYPE_CHECKING:
     from polycorner.intervals.balls import Ball, Matrix
-    from polycorner.spaces.manifold import Array
 
 MOST_STEPS, MOST_WIDENED = 200, 6  # of Newton's method, and of the box of Krawczyk's test
 LEAST_BITS = 2000  # of the half side of this box
@@ -289,7 +288,8 @@ class Examination:
         heavy = 1e6 * (abs(middle).max() or 1.0)
         stiff += [ball(heavy)] * len(w.equations) + [ball(heavy)] * len(w.gauges)
         rows = [*gradients[: self.held], *self.normals]
-        bent = _middle_form(middle, rows, stiff)
+        normals = zip(stiff, map(middles, rows), strict=True)
+        bent = sum((float(x.mid()) * np.outer(g, g) for x, g in normals), middle)
         turn = matrix(np.linalg.eigh((bent + bent.T) / 2)[1].tolist())
         # Turned first: errors of w g g^T would couple directions of very different stiffness.
         form = turn.transpose() * form * turn
@@ -454,14 +454,6 @@ def _least(balls: "Sequence[Ball]") -> "Ball":
 def row_sums(rows: "Matrix") -> "Ball":
     """Return an upper bound of the sums of sizes by rows."""
     return largest([sum((abs(x) for x in row), ball(0)) for row in rows.tolist()])
-
-
-def _middle_form(form: "Array", rows: "list[list[Ball]]", stiff: "list[Ball]") -> "Array":
-    found = form.copy()
-    for x, row in zip(stiff, rows, strict=True):
-        middle = middles(row)
-        found += float(x.mid()) * np.outer(middle, middle)
-    return found
 
 
 def _pivots(rows: "list[list[Ball]]") -> list[int]:

@@ -462,14 +462,14 @@ def _base(
     return -(preconditioner * value)
 
 
-def widened(enclosure: Enclosure, attempts: int = 12) -> "list[Ball]":
+def widened(enclosure: Enclosure) -> "list[Ball]":
     """Return the widest box tried, without parameters, in which the solution is unique.
 
     If ``|I - Y J| w < w`` over the box of radii ``w``, no matrix in ``J`` is singular, and two
     solutions in the box would contradict the mean value theorem ([Neumaier] sec. 5.1).
     """
     predictor = enclosure.predictor
-    for power in range(1, attempts + 1):
+    for power in range(1, 13):
         candidate = [ball(0, ball(unit / 10**power)) for unit in predictor.system.units]
         linear = predictor.system.linear(predictor.unknowns(candidate), predictor.box(candidate))
         if isinstance(linear, Undecided):

@@ -35,7 +35,6 @@ It is a statement in one chart: coordinates of circles are taken as real numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 from polycorner import checks
 from polycorner.intervals.balls import (
@@ -74,9 +73,6 @@ from polycorner.proofs.parameter_boxes import (
 from polycorner.proofs.proof import DOUBLE_DIGITS, Bounds, Proof
 from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.proofs.witnesses import Gauge
-
-if TYPE_CHECKING:
-    pass
 
 SHOWN_DIGITS = 3  # of what the given point violates
 MOST_CELLS = 10_000_000
