@@ -39,13 +39,7 @@ class Stop(Enum):
 class Course(Generic[P]):
     """A part of a curve of Fritz John points.
 
-    Attributes
-    ----------
-    points : list of FritzJohn
-        Its points, the first and the last included.
-    tangent : array
-        At the last one.
-    stop : Stop
+    The first point and the last are included; ``tangent`` is that at the last one.
     """
 
     points: list[P]

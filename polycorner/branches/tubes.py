@@ -327,10 +327,7 @@ class CurveSystem:
 class Tube:
     """A piece of a curve, and a neighbourhood without any other.
 
-    Attributes
-    ----------
-    enclosure : Enclosure
-        Over the interval of ``delta``.
+    The enclosure is one over the interval of ``delta``.
     """
 
     enclosure: Enclosure

@@ -108,14 +108,7 @@ def written(
 class Formulas:
     """Functions on a manifold, written into one graph whose only inputs are a box's sides.
 
-    Parameters
-    ----------
-    functions : sequence of SmoothFunction
-        The functions to evaluate.
-    manifold : Manifold
-        Their domain; its coordinates are the first inputs.
-    free : sequence of str, optional
-        Names of parameters that are inputs too, after the coordinates.
+    Inputs are the manifold's coordinates, then the parameters with the names in ``free``.
     """
 
     def __init__(

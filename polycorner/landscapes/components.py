@@ -109,11 +109,7 @@ class Component(Value):
 class Components(Value):
     """Connected parts of ``S``.
 
-    Attributes
-    ----------
-    parts : tuple of Component
-    open : bool
-        Whether two may be parts of one component, or others may be missing.
+    They are ``open`` where two may be parts of one component, or others may be missing.
     """
 
     parts: tuple[Component, ...]

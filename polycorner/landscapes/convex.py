@@ -48,12 +48,8 @@ Link = tuple[Fraction, Choice, Choice]
 class ConvexPieces:
     """The pieces of a polyhedron of affine functions in a box, and an energy that is affine.
 
-    Parameters
-    ----------
-    problem : Problem
-    rows : (m, n + 1) array of Fraction
-        Values at zero and derivatives of inequalities, equations, and the energy.
-    box : (n, 2) array of Fraction
+    ``rows`` ``(m, n + 1)`` are values at zero and derivatives of inequalities, equations, and the
+    energy; the box is ``(n, 2)``.
     """
 
     def __init__(self, problem: Problem, rows: Array, box: Array) -> None:
@@ -143,12 +139,8 @@ class _Join:
 class ConvexTree:
     """The tree in which components of ``{E <= c}`` are born and merge as ``c`` rises.
 
-    Attributes
-    ----------
-    minima : list of list of Choice
-        The pieces that have the set of each local minimum in common, the lowest first.
-    joins : list of _Join
-        Where components merge, the lowest first.
+    ``minima`` are the pieces that have the set of each local minimum in common, and ``joins`` are
+    where components merge; the lowest are first in both.
     """
 
     def __init__(

@@ -54,13 +54,8 @@ class Way:
 class Junction:
     """Where components of a sublevel set join at a point.
 
-    Attributes
-    ----------
-    ways : tuple of Way
-        One for each component below the point nearby; fewer than two at no pass.
-    index : int
-        Negative curvatures along the face of the contacts with positive multipliers.
-    kind : {"saddle", "tip", "locus"}
+    It has a way for each component below the point nearby, fewer than two at no pass; the index
+    counts negative curvatures along the face of the contacts with positive multipliers.
     """
 
     ways: tuple[Way, ...]

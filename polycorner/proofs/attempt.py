@@ -46,17 +46,7 @@ FAR = f"{SUBJECT} near the point"
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """A claim, approximate unknowns, and the result for declared fields that are no symmetries.
-
-    Attributes
-    ----------
-    claim : Claim
-        What is to be proved.
-    start : list of Ball
-        Approximate unknowns of its system.
-    refused : ConditionResult or None
-        The result for a declared field that is not a symmetry, if there is one.
-    """
+    """A claim, approximate unknowns, and the result for declared fields that are no symmetries."""
 
     claim: Claim
     start: "list[Ball]"

@@ -38,18 +38,8 @@ SIMPLE = 10_000  # largest denominator of a coordinate that is taken to be ratio
 class WitnessSearch:
     """The witnesses near one point.
 
-    Parameters
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    formulas : Formulas
-        Its inequalities, equations and energy.
-    point : (n,) array
-        The point near which a minimum is sought.
-    fields : sequence of Generator
-        Symmetries modulo which it is one.
-    tolerances : Tolerances
-        Up to which distance functions are contacts.
+    Functions are contacts up to a distance of the tolerances; the fields are symmetries modulo
+    which there is a minimum.
     """
 
     def __init__(

@@ -45,14 +45,8 @@ MOST_SYMBOLS, MOST_DEGREE, MOST_SUMMANDS = 6, 6, 40
 class ExactPoint:
     """An enclosed solution whose unknowns are known exactly, or as zeros of known polynomials.
 
-    Attributes
-    ----------
-    unknowns : tuple of Polynomial
-        Coordinates and multipliers, in symbols.
-    symbols : Symbols
-        Constants, and coordinates that are no combinations of them.
-    zeros : tuple of Polynomial
-        Polynomials in symbols that vanish.
+    ``unknowns`` are coordinates and multipliers, in symbols: constants, and coordinates that are no
+    combinations of them; ``zeros`` are polynomials in symbols that vanish.
     """
 
     unknowns: tuple[Polynomial, ...]

@@ -71,14 +71,7 @@ def undecided(reason: str) -> ConditionResult:
 class Claim:
     """The claim that a face carries a minimum: its KKT system, modulo symmetries.
 
-    Attributes
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    system : KKTSystem
-        The KKT equations of the face.
-    fields : tuple of Generator
-        One for every gauge of the system.
+    There is a field for every gauge of the system.
     """
 
     problem: Problem

@@ -36,12 +36,7 @@ if TYPE_CHECKING:
 class Generator:
     """A vector field on a manifold, given by one component for each coordinate.
 
-    Attributes
-    ----------
-    manifold : Manifold
-        The manifold it is defined on.
-    components : tuple of SmoothFunction
-        One for each coordinate; constants are functions, too.
+    Components that are constant are functions, too.
     """
 
     manifold: Manifold

@@ -173,12 +173,7 @@ def _middle(sides: tuple[str, str]) -> str:
 class Signs:
     """A polyhedron and an energy about a point: signs, enclosures and refutations.
 
-    Parameters
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    bits : int
-        The working precision.
+    ``bits`` is the working precision.
     """
 
     def __init__(self, problem: Problem, bits: int) -> None:

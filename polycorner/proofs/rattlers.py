@@ -39,13 +39,7 @@ def reads(formulas: Formulas, row: int) -> frozenset[int]:
 class Rattlers:
     """Coordinates that rattle, and the functions that read them.
 
-    Parameters
-    ----------
-    problem : Problem
-    formulas : Formulas
-        Its inequalities, equations and energy.
-    coordinates : sequence of int
-        Those that neither the energy nor equations nor functions that support read.
+    Neither the energy nor equations nor functions that support read these coordinates.
     """
 
     def __init__(self, problem: Problem, formulas: Formulas, coordinates: Sequence[int]) -> None:

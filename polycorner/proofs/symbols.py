@@ -33,10 +33,7 @@ Key = tuple[Any, ...]
 class Symbols:
     """The symbols of polynomials: each is an open coordinate, a constant or an operation.
 
-    Attributes
-    ----------
-    places : dict from int to Ball
-        Enclosures of open coordinates that stand for one number each.
+    ``places`` are enclosures of open coordinates that stand for one number each.
     """
 
     def __init__(self) -> None:

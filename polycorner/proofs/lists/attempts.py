@@ -85,12 +85,8 @@ def _regular(matrix: Array) -> NDArray[np.bool_]:
 class FacesOfPoints:
     """Rows of the functions that vanish on faces, one face for each point.
 
-    Attributes
-    ----------
-    rows : (B, k) array of int
-        The active inequalities, filled up to the most that a face has, then the equations.
-    filled : (B, k) array of bool
-        Which of them only fill up.
+    ``rows`` ``(B, k)`` are the active inequalities, filled up to the most that a face has, then the
+    equations; ``filled`` says which of them only fill up.
     """
 
     rows: NDArray[np.intp]
@@ -204,14 +200,7 @@ def active_sets(weights: Array, pulls: Array) -> Mask:
 
 @dataclass
 class Screen:
-    """KKT points of one face, approximately, about which boxes are tried.
-
-    Attributes
-    ----------
-    setting : Setting
-    active : tuple of int
-    q : (B, n) array
-    """
+    """KKT points of one face, approximately, about which boxes are tried."""
 
     setting: Setting
     active: Sequence[int]

@@ -210,12 +210,8 @@ class CornerList(ProvedList[CornerPoint]):
 class Candidate(RegionPoint):
     """A point that may be a corner.
 
-    Attributes
-    ----------
-    number : int
-        Of its region in the search.
-    active : tuple of int or None
-        Those that vanish and matter; None where that is not decided.
+    ``number`` is that of its region in the search; ``active`` are the functions that vanish and
+    matter, None where that is not decided.
     """
 
     number: int

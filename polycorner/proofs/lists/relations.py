@@ -38,12 +38,7 @@ Literal = tuple[int, int]  # a function, equations after inequalities, and a sig
 class Relation(Value):
     """Weights with which inequalities and equations add up to nothing.
 
-    Attributes
-    ----------
-    rows : tuple of int
-        Inequalities, all with weights that are not 0.
-    weights : tuple of Fraction
-        Theirs, then those of the equations.
+    No weight of an inequality is 0; those of the equations come last.
     """
 
     rows: tuple[int, ...]
@@ -90,12 +85,8 @@ def relation(problem: Problem, rows: Sequence[int]) -> Relation | None:
 class Pieces:
     """A set as a union of polyhedra, in none of which functions are multiples of each other.
 
-    Attributes
-    ----------
-    parts : tuple of Polyhedron
-        Branches with the same equations are one part.
-    alike : mapping from str to str
-        The name of the function of which each one is a multiple, by name.
+    Branches with the same equations are one part; ``alike`` has the name of the function of which
+    each one is a multiple, by name.
     """
 
     parts: tuple[Polyhedron, ...]
