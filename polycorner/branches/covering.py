@@ -19,7 +19,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +30,7 @@ from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.branches.tubes import CurveSystem, Setting, Tube
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     between,
     column,
@@ -51,9 +51,6 @@ from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.faces import outward
 from polycorner.proofs.lists.intermediate import directions
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 def event_tubes(

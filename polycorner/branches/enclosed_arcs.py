@@ -14,7 +14,6 @@ that the KKT matrix annihilates.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,15 +27,12 @@ from polycorner.branches.tubes import (
     point,
     tube,
 )
-from polycorner.intervals.balls import ball, balls, middles
+from polycorner.intervals.balls import Ball, ball, balls, middles
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import bordered, newton
 from polycorner.proofs.lists.faces import inertia
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 class Watched:

@@ -23,7 +23,6 @@ curve are the two arcs.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,15 +37,12 @@ from polycorner.branches.tubes import (
     point,
     tube_about,
 )
-from polycorner.intervals.balls import ball, balls, dot, middles
+from polycorner.intervals.balls import Ball, ball, balls, dot, middles
 from polycorner.intervals.enclosures import Undecided
 from polycorner.proofs.definite import is_regular, pivots, tangent_form
 from polycorner.proofs.kkt import Enclosure
 from polycorner.proofs.witnesses import UnshownError, decided, need
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,14 @@ the odd ones are odd.  In *adapted* coordinates ``y`` each of the two is a place
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from polycorner import checks
 from polycorner.branches.diagram import Arc, BranchKind, Diagram
 from polycorner.branches.system import Face
-from polycorner.intervals.balls import ball
+from polycorner.intervals.balls import Ball, ball
 from polycorner.minimisation.methods import stationary_on
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.symmetry import Symmetry
@@ -24,9 +24,6 @@ from polycorner.proofs.lists.images import Motion, functions_moved, motion, perm
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True)

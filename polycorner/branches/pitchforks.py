@@ -24,7 +24,7 @@ regular beside the branch point.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import dropwhile
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.branches.tubes import CurveSystem, Setting, Tube, point
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     balls,
     column,
@@ -55,9 +56,6 @@ from polycorner.proofs.kkt import Enclosure, Linearisation, enclose, newton
 from polycorner.proofs.witnesses import need
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from polycorner.branches.pitchforks import Pitchfork, pitchfork
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.saving import Evidence, ProvedArc, save_proof
 from polycorner.branches.tubes import PIN, CurveSystem, Setting, Tube, point
-from polycorner.intervals.balls import ball, balls, middles, precision
+from polycorner.intervals.balls import Ball, ball, balls, middles, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
@@ -40,9 +40,6 @@ from polycorner.proofs.witnesses import UnshownError, decided, need
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 from polycorner.values import Checked
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 Interval = tuple[float, float]
 

@@ -16,7 +16,7 @@ points at which gradients become dependent are nothing special.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from polycorner.branches.mirrors import Image, Mirror
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     balls,
     column,
@@ -48,9 +49,6 @@ from polycorner.proofs.kkt import (
 )
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 PIN = "the pin of a tube"  # the last input, which no formula reads
 

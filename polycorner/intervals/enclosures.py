@@ -20,14 +20,12 @@ from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph, Program
 from polycorner.formulas.translate import compile_expressions
-from polycorner.intervals.balls import ANALYTIC, constant, operations
+from polycorner.intervals.balls import ANALYTIC, Ball, constant, operations
 from polycorner.intervals.tapes import Box, Tape
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
     import sympy
-
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True)

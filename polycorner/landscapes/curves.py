@@ -26,20 +26,17 @@ less than ``r``.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, balls, dot, matrix, middles, precision, square
+from polycorner.intervals.balls import Ball, ball, balls, dot, matrix, middles, precision, square
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation.problem import Problem
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value, cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 BITS = 106
 MOST_HALVINGS = 6  # of a straight piece before it is given up

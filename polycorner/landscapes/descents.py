@@ -12,12 +12,11 @@ from the minimum reaches.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import nnls
 
-from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.balls import Ball, ball, precision
 from polycorner.landscapes.components import Component
 from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.routes import Route
@@ -25,9 +24,6 @@ from polycorner.polyhedra.cones import least_distance
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True)

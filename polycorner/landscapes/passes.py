@@ -39,7 +39,7 @@ all the same.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from scipy.optimize import linprog
@@ -57,12 +57,9 @@ from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import StationaryList, StationaryPoint
 from polycorner.proofs.kkt import KKTSystem, enclose, newton
 from polycorner.proofs.lists.critical import CriticalList, CriticalMember
+from polycorner.proofs.lists.images import Motion
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
-
-if TYPE_CHECKING:
-    from polycorner.proofs.lists.images import Motion
-
 
 # Whether a way bends down, what is held or rises along it, and its direction, scaled.
 Start: TypeAlias = tuple[bool, frozenset[int], Array]
@@ -423,7 +420,7 @@ class Sorted:
             return Side(OUTSIDE - 1 - number + len(self.nodes), route)
         return Side(number, route)
 
-    def _permutation(self, g: "Motion") -> list[int | None]:
+    def _permutation(self, g: Motion) -> list[int | None]:
         """Return where a symmetry takes the nodes; None where that is not decided."""
         manifold = self.problem.polyhedron.manifold
         found: list[int | None] = []
@@ -447,7 +444,7 @@ class Sorted:
         self,
         first: Pass,
         one: PossiblePass,
-        motions: "Sequence[tuple[Motion, list[int | None]]]",
+        motions: Sequence[tuple[Motion, list[int | None]]],
     ) -> Pass | None:
         """Return a pass carried along by the symmetry that takes another one to it."""
         manifold = self.problem.polyhedron.manifold

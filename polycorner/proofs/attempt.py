@@ -3,11 +3,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations, islice
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.intervals.balls import GUARD_BITS, ball, bits_for, middles, precision
+from polycorner.intervals.balls import GUARD_BITS, Ball, ball, bits_for, middles, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate, Entrapment
@@ -29,11 +28,8 @@ from polycorner.proofs.invariance import (
     translations,
 )
 from polycorner.proofs.kkt import FIRST_BITS, SUBJECT, Enclosure, KKTSystem, enclose, newton
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-    from polycorner.spaces.manifold import Array
 
 MOST_SUBSETS = 1000  # of one size that are examined
 MOST_FACES = 8  # on which a proof is tried
@@ -100,7 +96,7 @@ def _subsets(rows: Sequence[int], most: int) -> Iterator[tuple[int, ...]]:
         yield from islice(combinations(rows, size), MOST_SUBSETS)
 
 
-def _carries(rows: Rows, size: int, slope: "Array", small: float) -> bool:
+def _carries(rows: Rows, size: int, slope: Array, small: float) -> bool:
     """Whether the energy's gradient is a combination of rows, the first ``size`` of them > 0."""
     weights = rows.weights(slope) if len(rows.units) else np.empty(0)
     rest = slope - weights @ rows.units
@@ -173,7 +169,7 @@ def _invariant(
 
 
 def _independent(
-    fields: Sequence[Generator], box: Box, scales: "Array", rank_tolerance: float
+    fields: Sequence[Generator], box: Box, scales: Array, rank_tolerance: float
 ) -> tuple[tuple[Generator, ...], tuple[tuple[float, ...], ...]]:
     """Return fields with independent vectors at the point, and a normal for each.
 

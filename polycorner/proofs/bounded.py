@@ -39,11 +39,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     column,
     decimals,
@@ -64,9 +64,6 @@ from polycorner.proofs.invariance import annihilated
 from polycorner.proofs.rattlers import reads
 from polycorner.proofs.witnesses import UnshownError, Witness, decided, need
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 SUBJECT = "a minimum between two energies"
 

@@ -7,12 +7,12 @@ Everything here is in doubles, or at the midpoints of balls; what it finds is pr
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, balls, bits_for, exact, middles, precision
+from polycorner.intervals.balls import Ball, ball, balls, bits_for, exact, middles, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
@@ -22,11 +22,8 @@ from polycorner.proofs.growth import Examination
 from polycorner.proofs.invariance import Generator, generators, translations
 from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.proofs.witnesses import Gauge, UnshownError, Witness
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-    from polycorner.spaces.manifold import Array
 
 UNIT = 1e-3  # share of the energy's slope up to which the support of multipliers is counted
 BITS = 128
@@ -46,7 +43,7 @@ class WitnessSearch:
         self,
         problem: Problem,
         formulas: Formulas,
-        point: "Array",
+        point: Array,
         fields: Sequence[Generator],
         tolerances: Tolerances,
     ) -> None:
@@ -65,7 +62,7 @@ class WitnessSearch:
 
     # -------------------------------------------------------------------------------- multipliers
 
-    def multipliers(self, contacts: Sequence[int], q: "Array") -> "tuple[list[int], Array] | None":
+    def multipliers(self, contacts: Sequence[int], q: Array) -> tuple[list[int], Array] | None:
         """Return the rows of ``S`` and weights of ``S`` and the equations; None without any.
 
         The support is the fullest; on it the least weight, relative to its gradient, is largest.
@@ -111,7 +108,7 @@ class WitnessSearch:
     def polished(
         self,
         supports: Sequence[int],
-        weights: "Array",
+        weights: Array,
         gauges: Sequence[Gauge],
         start: "list[Ball]",
         bits: int,
@@ -381,7 +378,7 @@ class WitnessSearch:
 def bounded_minimum(
     problem: Problem,
     formulas: Formulas,
-    point: "Array",
+    point: Array,
     fields: Sequence[Generator],
     tolerances: Tolerances,
     digits: int,

@@ -18,19 +18,16 @@ Values are polynomials in symbols (:mod:`~polycorner.proofs.symbols`).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, exact, integer_relation
+from polycorner.intervals.balls import Ball, ball, exact, integer_relation
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.kkt import Enclosure, KKTSystem
 from polycorner.proofs.polynomials import Polynomial
 from polycorner.proofs.symbols import Symbols, constants, evaluate, opened
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 MOST_POWERS = 4  # degree of a polynomial of which a coordinate may be a root
 MOST_CONSTANTS = 6  # irrational constants among which a number is sought

@@ -40,11 +40,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from polycorner.intervals.balls import (
+    Ball,
+    Matrix,
     ball,
     balls,
     column,
@@ -67,9 +69,6 @@ from polycorner.proofs.rattlers import reads
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.proofs.witnesses import UnshownError, Witness, decided, need
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball, Matrix
 
 MOST_STEPS, MOST_WIDENED = 200, 6  # of Newton's method, and of the box of Krawczyk's test
 LEAST_BITS = 2000  # of the half side of this box

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-from polycorner.intervals.balls import bounds, decimals, dot
+from polycorner.intervals.balls import Ball, bounds, decimals, dot
 from polycorner.intervals.enclosures import Undecided
 from polycorner.minimisation import Problem
 from polycorner.proofs.definite import is_regular, pivots, positive_on_cone, tangent_form
@@ -14,9 +14,6 @@ from polycorner.proofs.exact import ExactPoint, implied, recognised
 from polycorner.proofs.invariance import Generator, annihilated, slope_bounds
 from polycorner.proofs.kkt import Enclosure, KKTSystem
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 T = TypeVar("T")
 

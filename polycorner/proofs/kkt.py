@@ -27,9 +27,11 @@ Since ``J`` is convex and all its matrices are regular, the inertia of the KKT m
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from polycorner.intervals.balls import (
+    Ball,
+    Matrix,
     ball,
     column,
     dot,
@@ -44,9 +46,6 @@ from polycorner.intervals.balls import (
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball, Matrix
 
 FIRST_BITS = 128  # precision at which Newton's method starts; it then doubles
 MOST_STEPS = 25

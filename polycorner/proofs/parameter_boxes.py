@@ -6,12 +6,13 @@ from heapq import heappop, heappush
 from itertools import count, product
 from math import isfinite, nextafter, prod
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from polycorner import checks
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     balls,
     between,
@@ -40,9 +41,6 @@ from polycorner.proofs.hypotheses import (
 from polycorner.proofs.kkt import Cell, Enclosure, enclose, newton
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 CELL_BITS = 64
 MOST_STRIDES = 16  # into which a path through the parameters is divided

@@ -9,17 +9,22 @@ enclosures show it.
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from math import isqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Payload
-from polycorner.intervals.balls import ball, constant, current_precision, exact, operations, roots
+from polycorner.intervals.balls import (
+    Ball,
+    ball,
+    constant,
+    current_precision,
+    exact,
+    operations,
+    roots,
+)
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.polynomials import Polynomial, TooLargeError
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 ZERO = Fraction(0)
 ONE = Fraction(1)

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     between,
     column,
@@ -44,8 +45,6 @@ from polycorner.tolerances import SEARCH
 from polycorner.values import Value
 
 if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-
     Equations = tuple[list[Ball], list[list[Ball]]]  # residual and Jacobian
 
 BITS = 128

@@ -33,11 +33,11 @@ equations for ``s`` and ``-s`` give ``(t + t') tau r_j <= tau sum (mu_i + mu'_i)
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, column, dot, entries, matrix, middles, precision
+from polycorner.intervals.balls import Ball, ball, column, dot, entries, matrix, middles, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
@@ -45,9 +45,6 @@ from polycorner.proofs.lists.coincidences import ZERO, Place, signs
 from polycorner.proofs.lists.faces import BITS, EnclosedFaces, Region, enclosing, outward
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, SEARCH
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 SHRINKINGS = 8  # of a box
 LEAST_SHARE, MOST_SHARE = 0.25, 0.9  # of a box that the next one reaches

@@ -13,10 +13,11 @@ whole faces.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -24,9 +25,6 @@ from polycorner.proofs.lists.branches import conjunctions
 from polycorner.proofs.lists.images import expanded
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.formulas.functions import SmoothFunction
 
 MORE = 6  # points at which values are compared, beyond the number of functions
 MOST_DENOMINATOR = 10_000
@@ -189,7 +187,7 @@ def _literals(polyhedron: Polyhedron) -> list[Literal]:
     return [found.get(j, (j, 1)) for j in range(len(functions))]
 
 
-def _multiple(f: "SmoothFunction", g: "SmoothFunction") -> int:
+def _multiple(f: SmoothFunction, g: SmoothFunction) -> int:
     """Return the sign of ``c`` if expanded formulas show that ``f = c g``, and 0 if not."""
     import sympy
 

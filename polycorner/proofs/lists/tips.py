@@ -20,11 +20,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, balls, dot, middles, precision
+from polycorner.intervals.balls import Ball, ball, balls, dot, middles, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import polynomials as algebra
@@ -33,9 +33,6 @@ from polycorner.proofs.lists.faces import BITS, EnclosedFaces, Region, enclosing
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 DENOMINATORS = (1, 12, 1000, 10**6)
 FACTORS = (1.0, 4.0, 16.0, 64.0)  # of the least w that may do, by the sizes of the terms of Q
