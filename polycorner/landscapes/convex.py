@@ -26,7 +26,6 @@ from typing import Any
 import numpy as np
 from scipy.cluster.hierarchy import DisjointSet
 
-from polycorner import checks
 from polycorner.formulas.ranges import outward
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.enclosures import Formulas
@@ -268,30 +267,11 @@ def convex_landscape(
     equally high, as many as it takes.  Routes are straight in each piece, and their vertices are
     the doubles next to rational ones.
 
-    Parameters
-    ----------
-    problem : Problem
-    box : sequence or mapping
-        As for :func:`.stationary_points`.  Its sides are walls.
-    cap : float, optional
-        The energy up to which the landscape is sought.
-    max_pieces, max_seconds : optional
-        Where the search ends at the latest, with what is known up to a lower cap.  It ends so at
-        Ctrl-C, too.
-    progress : Progress, optional
-        Called with the number of pieces that were examined, those with parts of the first unions
-        only among them, None, and what was found in words.
-
-    Returns
-    -------
-    Landscape or None
-        None where the manifold has other factors than lines, where a function or the energy is not
-        affine with rational coefficients (doubles are rational).
-
-    Raises
-    ------
-    TypeError, ValueError
-        For a box that is none.
+    It is None where the manifold has other factors than lines, where a function or the energy is
+    not affine with rational coefficients (doubles are rational).  The sides of the box are walls.
+    A search that ends early, as after ``max_pieces`` pieces or at Ctrl-C, leaves what is known up
+    to a lower cap.  Progress is called with the number of pieces that were examined, those with
+    parts of the first unions only among them, None, and what was found in words.
 
     Examples
     --------
@@ -309,9 +289,6 @@ def convex_landscape(
     ([[0.0, 0.0], [3.0, 0.0], [0.25, 0.25]], [(0.5, 0.5), (1.5, 1.5)])
     """
     manifold = problem.polyhedron.manifold
-    checks.real("cap", cap, infinite=True)
-    checks.whole("max_pieces", max_pieces, least=1)
-    checks.real("max_seconds", max_seconds, above=0, infinite=True)
     if manifold.factors or np.isfinite(manifold.periods).any():
         return None
     whole = domain(manifold, box)

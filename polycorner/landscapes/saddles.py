@@ -60,31 +60,16 @@ def search_passes(  # noqa: PLR0913 - all but two are options
 ) -> tuple[Certificate, ...]:
     """Search for passes by walks uphill from given minima.
 
-    Parameters
-    ----------
-    problem : Problem
-    minima : sequence of Certificate
-        From which, and between which, walks start.
-    starts : int
-        How many walks are done.
-    rng : Generator
-        Source of directions.
-    tolerances : Tolerances, optional
-    symmetry : Symmetry, optional
-        Up to which passes are listed once.
-    cap : float, optional
-        The highest energy.
-    points : sequence of (n,) arrays, optional
-        Points from which other walks start.
-    progress : callable, optional
-        Called with walks done, their number, and the number of stationary points in words.
+    ``starts`` walks are done from the minima and between them, and others from ``points``.
+    Progress is called with walks done, their number, and the number of stationary points in words.
 
     Returns
     -------
     tuple of Certificate
-        The lowest first: saddles of index 1 with positive multipliers; in a union, minima on two
-        branches at once; with multipliers that are zero, what the second order makes a pass.
-        After an interruption (Ctrl-C), those that were found so far.
+        The lowest first, up to the symmetry and the energy ``cap``: saddles of index 1 with
+        positive multipliers; in a union, minima on two branches at once; with multipliers that are
+        zero, what the second order makes a pass.  After an interruption (Ctrl-C), those that were
+        found so far.
     """
     quotient = Paths(problem.polyhedron, symmetry or Symmetry(), tolerances, problem=problem)
     walks, loci = Walks(problem, orbits_of(problem, symmetry), tolerances), Loci(quotient)

@@ -47,22 +47,9 @@ def proved_skeleton(
 ) -> Skeleton:
     """Return the skeleton found from corners, and whether its corners are proved to be all.
 
-    Parameters
-    ----------
-    polyhedron : Polyhedron
-    points : sequence of (n,) arrays
-        The corners of a list.
-    symmetry : Symmetry
-        Symmetry to divide by.
-    complete : bool
-        Whether the list is complete.
-    starts : sequence of (n,) arrays, optional
-        Points of the set from which the search sets out as well.
-    tolerance : float, optional
-        Distance, in scale units, up to which a function counts as zero; corners of either side are
-        compared with what belongs to it.
-    options
-        Of :func:`polycorner.skeleton`.
+    ``points`` are the corners of a list, which may be complete; the search sets out from
+    ``starts``, points of the set, as well.  A function counts as zero up to ``tolerance``, in scale
+    units, and corners of either side are compared with what belongs to it.
     """
     rows = [*points, *(np.asarray(q, dtype=float) for q in starts)]
     around = np.reshape(rows, (-1, polyhedron.manifold.size))
