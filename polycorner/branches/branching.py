@@ -50,10 +50,10 @@ def branch_point(near: FritzJohn) -> BranchPoint | None:
     return next((found for found in tried if found is not None), None)
 
 
-def _polished(near: FritzJohn, lost: int, *, steps: int = 12) -> BranchPoint | None:
+def _polished(near: FritzJohn, lost: int) -> BranchPoint | None:
     """Solve ``z F' v = 0`` on the kernel, and the equations across it."""
     tolerances, at = near.system.tolerances, near
-    for _ in range(steps):
+    for _ in range(12):
         if not at.finite or np.linalg.norm(at.x - near.x) > 10 * tolerances.beside:
             return None
         u, values, vt = np.linalg.svd(at.bordered)

@@ -39,13 +39,7 @@ class Stop(Enum):
 class Course(Generic[P]):
     """A part of a curve of Fritz John points.
 
-    Attributes
-    ----------
-    points : list of FritzJohn
-        Its points, the first and the last included.
-    tangent : array
-        At the last one.
-    stop : Stop
+    The first point and the last are included; ``tangent`` is that at the last one.
     """
 
     points: list[P]
@@ -58,13 +52,13 @@ class Course(Generic[P]):
         return self.points[-1]
 
 
-def corrected(guess: P, across: Array, reach: float, *, steps: int = 8) -> P | None:
+def corrected(guess: P, across: Array, reach: float) -> P | None:
     """Return the point of the curve in the plane through a guess across a direction, or None.
 
-    None too where Newton's method strays more than ``reach`` or needs more than ``steps``.
+    None too where Newton's method strays more than ``reach`` or needs more than eight steps.
     """
     at, start, last = guess, guess.x, math.inf
-    for _ in range(steps):
+    for _ in range(8):
         if not at.finite:
             return None
         step = at.newton_step(across, float(across @ (at.x - start)))
@@ -78,10 +72,10 @@ def corrected(guess: P, across: Array, reach: float, *, steps: int = 8) -> P | N
     return None
 
 
-def polished(at: P, j: int, *, steps: int = 8) -> P | None:
+def polished(at: P, j: int) -> P | None:
     """Return the point of the curve nearby where what is watched at ``j`` vanishes, or None."""
     start = at.x
-    for _ in range(steps):
+    for _ in range(8):
         values, slopes = at.watched()
         step = at.newton_step(slopes[[j]], float(values[j]))
         at = at.moved(at.x + step)
@@ -93,11 +87,9 @@ def polished(at: P, j: int, *, steps: int = 8) -> P | None:
 
 
 class _Continuation(Stepper[P]):
-    def __init__(
-        self, start: P, direction: Array, options: WalkOptions, extent: float, most: int
-    ) -> None:
+    def __init__(self, start: P, direction: Array, options: WalkOptions, extent: float) -> None:
         super().__init__(start, direction, options)
-        self.system, self.out, self.extent, self.most = start.system, direction, extent, most
+        self.system, self.out, self.extent = start.system, direction, extent
         values, slopes = start.watched()
         # Functions of a union may be negative; they are watched from the side on which they start.
         side = np.where(abs(values) <= self.system.tolerances.zero, slopes @ direction, values)
@@ -115,7 +107,7 @@ class _Continuation(Stepper[P]):
         """Step to the first event."""
         h, turn = self.options.first_step, self.options.turn
         while True:
-            if len(self.passed) > self.most:
+            if len(self.passed) > 2000:
                 return self._course(Stop.LONG)
             fitting = (trial for trial in self.trials(h) if trial[-1])
             taken = next((one for one in fitting if one[0].turns(self.point) < turn), None)
@@ -432,27 +424,12 @@ def _turns(slopes: tuple[float, float], change: float) -> bool:
     return bool(b < 0 < a and -b < 2 * a and first < b * b / (4 * a))
 
 
-def follow(
-    start: P,
-    direction: Array,
-    options: WalkOptions,
-    *,
-    extent: float = math.inf,
-    most: int = 2000,
-) -> Course[P]:
+def follow(start: P, direction: Array, options: WalkOptions, extent: float) -> Course[P]:
     """Follow the curve of Fritz John points through a point to the first event.
 
-    Parameters
-    ----------
-    start : FritzJohn
-    direction : array
-        Unit tangent in which to go.
-    options : WalkOptions
-    extent : float, optional
-        Distance from the start, in scale units, beyond which it stops.
-    most : int, optional
-        Steps, at most.
+    It goes along the unit tangent ``direction``, and stops beyond ``extent`` from the start, in
+    scale units.
     """
     arc = type(start) is FritzJohn or start.system.is_sparse
     kind: type[_Continuation[Any]] = _ArcContinuation if arc else _Continuation
-    return kind(start, direction, options, extent, most).run()
+    return kind(start, direction, options, extent).run()

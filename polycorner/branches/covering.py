@@ -19,25 +19,27 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.branches.enclosed_arcs import EnclosedArc, Watched
+from polycorner.branches.enclosed_arcs import Watched
 from polycorner.branches.enclosed_events import EnclosedEvent, Through, about_event
 from polycorner.branches.pitchforks import Pitchfork
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.branches.tubes import CurveSystem, Setting, Tube
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     between,
     column,
     constant,
     entries,
     identity,
+    left_inverse,
     matrix,
+    middles,
     midpoints,
 )
 from polycorner.intervals.boxes import BoxFunctions
@@ -49,9 +51,6 @@ from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.faces import outward
 from polycorner.proofs.lists.intermediate import directions
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 def event_tubes(
@@ -72,7 +71,7 @@ def _about(
     setting: Setting, curve: Through, watched: Watched, reach: float, bits: int
 ) -> Tube | None:
     system = CurveSystem(setting, curve.face)
-    middle = np.array([float(b.mid()) for b in curve.at])
+    middle = middles(curve.at)
     found = about_event(system, middle, curve.direction, reach, bits)
     if isinstance(found, Undecided) or not found.contains(curve.at):
         return None
@@ -253,7 +252,7 @@ class Cover:
                 return x
             rows = linear.jacobian[:-1]
             units = np.array(system.units)
-            middle = np.array([[float(b.mid()) for b in row] for row in rows]) * units
+            middle = middles(rows) * units
             if not np.isfinite(middle).all():
                 return x
             backwards = matrix((np.linalg.pinv(middle) * units[:, None]).tolist())
@@ -303,10 +302,9 @@ class Cover:
             return None
         n, d = self.n, system.dimension
         rows = [*(row[d:] for row in linear.jacobian[:n]), linear.jacobian[-2][d:]]
-        middle = np.array([[float(x.mid()) for x in row] for row in rows])
-        if not np.isfinite(middle).all():
+        left = left_inverse(rows)
+        if left is None:
             return None
-        left = matrix(np.linalg.pinv(middle).tolist())
         base = entries(left * column([*[ball(0)] * n, ball(1)]))
         off = (identity(len(base)) - left * matrix(rows)).tolist()
         norm = max(sum((abs(x) for x in row), ball(0)).upper() for row in off)
@@ -339,17 +337,3 @@ def _outward(x: Fraction) -> tuple[float, float]:
     near = float(x)
     exact = Fraction(near) == x
     return (near, near) if exact else (np.nextafter(near, -np.inf), np.nextafter(near, np.inf))
-
-
-def all_tubes(
-    setting: Setting,
-    arcs: Sequence[EnclosedArc],
-    events: Sequence[EnclosedEvent],
-    watched: Watched,
-    options: BranchProofOptions,
-) -> list[Tube]:
-    """Return the tubes of arcs, and those about events."""
-    found = [one for arc in arcs for one in arc.tubes]
-    for event in events:
-        found += event_tubes(setting, event, watched, options)
-    return found

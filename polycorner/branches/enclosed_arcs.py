@@ -14,7 +14,6 @@ that the KKT matrix annihilates.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,51 +27,25 @@ from polycorner.branches.tubes import (
     point,
     tube,
 )
-from polycorner.intervals.balls import ball
+from polycorner.intervals.balls import Ball, ball, balls, middles
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.kkt import bordered, newton
 from polycorner.proofs.lists.faces import inertia
 from polycorner.spaces.manifold import Array
 
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
-
-@dataclass(frozen=True)
 class Watched:
-    """What is watched, by number: functions, then the energy's multiplier and the parameter.
+    """What is watched, by number: functions, then what follows them.
 
-    Attributes
-    ----------
-    inequalities : int
-    low, high : Fraction
-        The interval of the parameter.
+    These are the energy's multiplier, the distances of the parameter from the start and the end of
+    its interval, which are ``low`` and ``high``, and its derivative, ``turn``.
     """
 
-    inequalities: int
-    low: Fraction
-    high: Fraction
-
-    @property
-    def energy(self) -> int:
-        """The energy's multiplier."""
-        return self.inequalities
-
-    @property
-    def start(self) -> int:
-        """The distance of the parameter from the start of its interval."""
-        return self.inequalities + 1
-
-    @property
-    def end(self) -> int:
-        """Its distance from the end."""
-        return self.inequalities + 2
-
-    @property
-    def turn(self) -> int:
-        """Its derivative."""
-        return self.inequalities + 3
+    def __init__(self, inequalities: int, low: Fraction, high: Fraction) -> None:
+        m = inequalities
+        self.inequalities, self.low, self.high = m, low, high
+        self.energy, self.start, self.end, self.turn = m, m + 1, m + 2, m + 3
 
     def at(self, setting: Setting, face: Face, x: "Sequence[Ball]") -> "list[Ball]":
         """Return enclosures of all that is watched but the derivative, on a box of unknowns."""
@@ -206,7 +179,7 @@ def enclosed_arc(
 
 def _time(system: CurveSystem, x: Array) -> float:
     setting = system.setting
-    return float(setting.time([ball(p) for p in x[setting.n : system.dimension].tolist()]).mid())
+    return float(setting.time(balls(x[setting.n : system.dimension])).mid())
 
 
 @dataclass(frozen=True)
@@ -261,10 +234,10 @@ def _between(system: CurveSystem, one: Array, two: Array, bits: int) -> Array | 
     """Return an approximate point of the curve between two of its points."""
     units, middle = np.array(system.units), (one + two) / 2
     pin = system.pinned(((two - one) / units**2).tolist(), middle.tolist())
-    found = newton(pin, [ball(x) for x in middle.tolist()], bits=bits)
+    found = newton(pin, balls(middle), bits=bits)
     if isinstance(found, Undecided):
         return None
-    x = np.array([float(b.mid()) for b in found])
+    x = middles(found)
     near = np.linalg.norm((x - middle) / units) < np.linalg.norm((two - one) / units)
     return x if near else None
 

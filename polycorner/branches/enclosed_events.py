@@ -23,7 +23,6 @@ curve are the two arcs.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -38,14 +37,12 @@ from polycorner.branches.tubes import (
     point,
     tube_about,
 )
-from polycorner.intervals.balls import ball, dot
+from polycorner.intervals.balls import Ball, ball, balls, dot, middles
 from polycorner.intervals.enclosures import Undecided
 from polycorner.proofs.definite import is_regular, pivots, tangent_form
 from polycorner.proofs.kkt import Enclosure
+from polycorner.proofs.witnesses import UnshownError, decided, need
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,9 +118,14 @@ class End:
 def enclosed_event(
     setting: Setting, ends: Sequence[End], watched: Watched, options: BranchProofOptions
 ) -> EnclosedEvent:
-    """Return what is shown of the event at which some arcs end, by what vanishes there."""
-    if not all(end.arc.reached[end.side] for end in ends):
-        return EnclosedEvent([], reason="an arc is not proved to come near")
+    """Return the event at which some arcs end, by what vanishes there.
+
+    Raises
+    ------
+    UnshownError
+        Where it is not shown.
+    """
+    need(all(end.arc.reached[end.side] for end in ends), "an arc is not proved to come near")
     about = _Event(setting, ends, watched, options)
     zeros = frozenset[int]().union(*(end.zeros for end in ends))
     if zeros in ({watched.start}, {watched.end}):
@@ -133,8 +135,8 @@ def enclosed_event(
     if watched.energy in zeros:
         return about.dependent()
     contacts = sorted(k for k in zeros if k < watched.inequalities)
-    if len(contacts) != len(zeros) or not contacts:
-        return EnclosedEvent([], reason="events of this kind are followed, not proved")
+    known = contacts and len(contacts) == len(zeros)
+    need(known, "events of this kind are followed, not proved")
     return about.contacts(contacts)
 
 
@@ -163,19 +165,17 @@ class _Event:
         k = self.setting.moved
         value = self.setting.at_time(t)[k - self.setting.n]
         system = CurveSystem(self.setting, end.arc.face).coordinate(k, value)
-        found = point(system, _balls(end.near), self.options.bits)
+        found = point(system, balls(end.near), self.options.bits)
         if isinstance(found, Undecided) or len(self.ends) != 1:
-            return EnclosedEvent([], reason=f"the end of the interval: {found}")
+            msg = f"the end of the interval: {found}"
+            raise UnshownError(msg)
         return self._told(found, [Arm(end.arc.face, end.side, found.solution)], BranchKind.END)
 
     def fold(self) -> EnclosedEvent:
         """Show a fold."""
-        reason = "two arcs of one face have to meet at a fold"
-        if len(self.ends) != 2 or self.ends[0].side != self.ends[1].side:
-            return EnclosedEvent([], reason=reason)
+        alike = {(end.side, end.arc.face) for end in self.ends}
+        need(len(self.ends) == 2 and len(alike) == 1, "two arcs of one face have to meet at a fold")
         one, two = self.ends
-        if one.arc.face != two.arc.face:
-            return EnclosedEvent([], reason=reason)
         system = one.tube.system
         for reach in self.options.near:
             about = tube_about(system.pinned(system.normal, one.near.tolist()), one.near, reach,
@@ -194,30 +194,29 @@ class _Event:
                 x = about.solution
                 if onwards[0] * onwards[1] < 0 and one.holds(x) and two.holds(x):
                     return EnclosedEvent(x[: self.d], BranchKind.FOLD)
-        return EnclosedEvent([], reason="the parameter is not shown to turn back once")
+        msg = "the parameter is not shown to turn back once"
+        raise UnshownError(msg)
 
     def dependent(self) -> EnclosedEvent:
         """Show an event at which the energy's multiplier vanishes."""
         end, n = self.ends[0], self.setting.n
         system = CurveSystem(self.setting, end.arc.face)
-        found = point(system.coordinate(system.size - 1), _balls(end.near), self.options.bits)
-        if isinstance(found, Undecided):
-            return EnclosedEvent([], reason=str(found))
-        there, e = Tube(found), self.watched.energy
-        if not all(x > 0 for k, x in enumerate(self.watched.values(there)[:e])):
-            return EnclosedEvent([], reason="more than the energy's multiplier vanishes")
+        found = self._point(system.coordinate(system.size - 1), end.near)
+        there = Tube(found)
+        others = self.watched.values(there)[: self.watched.energy]
+        need(all(x > 0 for x in others), "more than the energy's multiplier vanishes")
         # Any regular pin shows that the equations have one curve there, and no other relation.
-        self._through(system, found.solution, [e])
-        if there.velocity is None:
-            return EnclosedEvent([], reason="the equations are singular there")
+        self._through(system, found.solution, [self.watched.energy])
+        need(there.velocity is not None, "the equations are singular there")
         kind = BranchKind.DEPENDENT
         # One of the inequalities' gradients depends on the others: which one does not matter.
         form = tangent_form(found.linear.curvature, found.linear.rows[1:], [1.0] * n)
         left = None if form is None else pivots(form)
         if left is not None and len(left) == len(form or ()) and all(x > 0 for x in left):
             kind = BranchKind.VANISHES
-        elif left is None or not any(x < 0 for x in left):
-            return EnclosedEvent([], reason="whether the polyhedron is a point is not shown")
+        else:
+            falls = left is not None and any(x < 0 for x in left)
+            need(falls, "whether the polyhedron is a point is not shown")
         return self._told(found, [Arm(end.arc.face, end.side, found.solution)], kind)
 
     def contacts(self, weak: list[int]) -> EnclosedEvent:
@@ -229,23 +228,17 @@ class _Event:
         system = CurveSystem(self.setting, full)
         place = self.d + full.index(weak[0])
         near = self._unknowns(full, self.ends[0])
-        found = point(system.coordinate(place), _balls(near), self.options.bits)
-        if isinstance(found, Undecided):
-            return EnclosedEvent([], reason=str(found))
-        if not all(self._together(full, weak[0], k, found.solution) for k in weak[1:]):
-            reason = "no symmetry shows that several functions vanish at once"
-            return EnclosedEvent([], reason=reason)
+        found = self._point(system.coordinate(place), near)
+        together = all(self._together(full, weak[0], k, found.solution) for k in weak[1:])
+        need(together, "no symmetry shows that several functions vanish at once")
         values = self.watched.values(Tube(found))[: self.watched.energy + 1]
-        if not all(x > 0 for k, x in enumerate(values) if k not in weak):
-            return EnclosedEvent([], reason="more than the named functions may vanish")
+        alone = all(x > 0 for k, x in enumerate(values) if k not in weak)
+        need(alone, "more than the named functions may vanish")
         arms: list[Arm] = []
         for v in chain.from_iterable(combinations(weak, r) for r in range(len(weak) + 1)):
             face = tuple(i for i in full if i not in weak or i in v)
             x = [found.solution[k] for k in self._places(full, face)]
-            told = self._arms(face, x, weak)
-            if told is None:
-                return EnclosedEvent([], reason="a derivative may vanish")
-            arms += told
+            arms += self._arms(face, x, weak)
         return self._told(found, arms, _kind(arms))
 
     def _together(self, full: Face, first: int, other: int, x: "list[Ball]") -> bool:
@@ -257,10 +250,8 @@ class _Event:
         system = CurveSystem(self.setting, full)
         normal, k = [0.0] * system.size, self.setting.moved
         normal[k] = 1 / system.units[k]
-        middle = [float(b.mid()) for b in x]
-        about = tube_about(
-            system.pinned(normal, middle), np.array(middle), self.options.near[1], self.options.bits
-        )
+        middle, near, bits = middles(x), self.options.near[1], self.options.bits
+        about = tube_about(system.pinned(normal, middle.tolist()), middle, near, bits)
         if isinstance(about, Undecided) or not about.contains(x) or self.setting.equations:
             return False
         for g in self.setting.images:
@@ -272,33 +263,27 @@ class _Event:
         return False
 
     def _corner(self, full: Face) -> EnclosedEvent:
-        if len(full) + len(self.setting.equations) != self.setting.n + 1:
-            return EnclosedEvent([], reason="several functions too many vanish")
+        held = len(full) + len(self.setting.equations)
+        need(held == self.setting.n + 1, "several functions too many vanish")
         first: Enclosure | None = None
         arms: list[Arm] = []
         for gap in full:
             face = tuple(i for i in full if i != gap)
             system = CurveSystem(self.setting, face).closing(gap)
             near = null_unknowns(self.setting, face, self.ends[0].near[: self.d])
-            found = point(system, _balls(near), self.options.bits)
-            if isinstance(found, Undecided):
-                return EnclosedEvent([], reason=str(found))
+            found = self._point(system, near)
             first = first or found
-            if not self._same_corner(full, first, found):
-                return EnclosedEvent([], reason="the corner is not shown to be a single point")
+            same = self._same_corner(full, first, found)
+            need(same, "the corner is not shown to be a single point")
             values = self.watched.values(Tube(found))[: self.watched.energy + 1]
-            if not all(x > 0 for i, x in enumerate(values[:-1]) if i not in full):
-                return EnclosedEvent([], reason="more than the named functions may vanish")
+            alone = all(x > 0 for i, x in enumerate(values[:-1]) if i not in full)
+            need(alone, "more than the named functions may vanish")
             mu = [*(values[i] for i in face), values[-1]]
             if all(x > 0 for x in mu):
-                told = self._arms(face, found.solution, [gap])
-                if told is None:
-                    return EnclosedEvent([], reason="a derivative may vanish")
-                arms += told
-            elif any(x < 0 for x in mu):
-                self._through(system, found.solution, [gap])
+                arms += self._arms(face, found.solution, [gap])
             else:
-                return EnclosedEvent([], reason="a multiplier of a corner may vanish")
+                need(any(x < 0 for x in mu), "a multiplier of a corner may vanish")
+                self._through(system, found.solution, [gap])
         assert first is not None
         kind = BranchKind.VANISHES if len(arms) == 1 else _kind(arms)
         return self._told(first, arms, kind)
@@ -311,29 +296,25 @@ class _Event:
         linear = system.at([*hull, *[ball(0)] * len(system.rows)])
         if isinstance(linear, Undecided):
             return False
-        n, count = self.setting.n, len(linear.jacobian)
-        held = len(full) + len(self.setting.equations)
-        rows = [row[: self.d] for row in linear.jacobian[n : count - 2]]
-        return held == n + 1 and is_regular(rows)
+        return is_regular([row[: self.d] for row in linear.jacobian[self.setting.n : -2]])
 
-    def _arms(self, face: Face, x: "list[Ball]", weak: Sequence[int]) -> list[Arm] | None:
-        """Return the sides of a face's curve on which all that vanishes grows; None if not shown.
+    def _arms(self, face: Face, x: "list[Ball]", weak: Sequence[int]) -> list[Arm]:
+        """Return the sides of a face's curve on which all that vanishes grows.
 
         The curve is cut where ``x`` is by a pin along its approximate direction.
         """
-        system = CurveSystem(self.setting, face)
+        system, reason = CurveSystem(self.setting, face), "a derivative may vanish"
         direction = self._through(system, x, weak)
         if direction is None:
-            return None
-        middle = np.array([float(b.mid()) for b in x])
-        about = about_event(system, middle, direction, self.options.near[1], self.options.bits)
+            raise UnshownError(reason)
+        near, bits = self.options.near[1], self.options.bits
+        about = about_event(system, middles(x), direction, near, bits)
         if isinstance(about, Undecided) or not about.contains(x):
-            return None
+            raise UnshownError(reason)
         rates = [self.watched.rate(about, k) for k in weak]
         turn = self.watched.values(about)[self.watched.turn]
         known = [r for r in rates if r is not None and not r.contains(0)]
-        if len(known) != len(weak) or turn.contains(0):
-            return None
+        need(len(known) == len(weak) and not turn.contains(0), reason)
         sides = [s for s in (1, -1) if all(s * r > 0 for r in known)]
         return [Arm(face, int(bool(s * turn < 0)), x) for s in sides]
 
@@ -351,14 +332,14 @@ class _Event:
                 end for end in left
                 if end.arc.face == arm.face and end.side == arm.side and end.holds(arm.at)
             ]  # fmt: skip
-            if not same:
-                names = ", ".join(self.setting.formulas.names[i] for i in arm.face) or "nothing"
-                reason = f"an arc with {names} active leaves, which is not in the diagram"
-                return EnclosedEvent([], reason=reason)
+            names = ", ".join(self.setting.formulas.names[i] for i in arm.face) or "nothing"
+            need(same, f"an arc with {names} active leaves, which is not in the diagram")
             left.remove(same[0])
-        if left:
-            return EnclosedEvent([], reason="it is not shown that all of its arcs end there")
+        need(not left, "it is not shown that all of its arcs end there")
         return EnclosedEvent(found.solution[: self.d], kind, curves=tuple(self.curves))
+
+    def _point(self, system: CurveSystem, near: Array) -> Enclosure:
+        return decided(point(system, balls(near), self.options.bits))
 
     def _places(self, full: Face, face: Face) -> list[int]:
         """Return the places of the unknowns of a face among those of a larger one."""
@@ -396,16 +377,12 @@ def about_event(
     return tube_about(pinned, middle, reach, bits)
 
 
-def _balls(x: Array) -> "list[Ball]":
-    return [ball(value) for value in x.tolist()]
-
-
 def direction_at(system: CurveSystem, x: "Sequence[Ball]") -> Array | None:
     """Return the unit tangent of a curve at a point, in units, approximately; None if none."""
     some = system.coordinate(0).at(x)
     if isinstance(some, Undecided):
         return None
-    rows = np.array([[float(b.mid()) for b in row] for row in some.jacobian[:-1]])
+    rows = middles(some.jacobian[:-1])
     if not np.isfinite(rows).all():
         return None
     return np.asarray(np.linalg.svd(rows * np.array(system.units))[2][-1])
@@ -414,12 +391,12 @@ def direction_at(system: CurveSystem, x: "Sequence[Ball]") -> Array | None:
 def null_unknowns(setting: Setting, face: Face, place: Array) -> Array:
     """Return unknowns at a place, with the multipliers that nearly relate the gradients."""
     system = CurveSystem(setting, face).coordinate(0)
-    x = [*_balls(place), *[ball(0)] * len(system.rows)]
+    x = [*balls(place), *[ball(0)] * len(system.rows)]
     linear = system.at(x)
     n, d = setting.n, len(setting.units)
     if isinstance(linear, Undecided):
         return np.concatenate([place, np.full(len(system.rows), np.nan)])
-    slopes = np.array([[float(b.mid()) for b in row[d:]] for row in linear.jacobian[:n]])
+    slopes = middles([row[d:] for row in linear.jacobian[:n]])
     mu = np.linalg.svd(slopes)[2][-1]
     total = mu @ np.array([float(row not in setting.equations) for row in system.rows])
     return np.concatenate([place, mu / total if total else mu])

@@ -18,17 +18,17 @@ A curve ends where something more vanishes; there other curves begin, by what va
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import partial
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
 from polycorner import checks
-from polycorner.branches.continuation import Course, Stop, corrected, follow
+from polycorner.branches.continuation import Course, Stop, corrected
 from polycorner.branches.diagram import BranchEvent, BranchKind, Diagram
 from polycorner.branches.event_map import EventCurve, EventMap, MeetingKind, MeetingPoint
 from polycorner.branches.event_points import FOLD, SYMMETRIC, EventPoint, kind_and_gain
+from polycorner.branches.network import Arm, Curve, Network, Node
 from polycorner.branches.posing import posed
 from polycorner.branches.search import interval_ends
 from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
@@ -36,51 +36,35 @@ from polycorner.kinds import checked
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.searches import Ending, Task, work_through
+from polycorner.searches import Ending, work_through
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
-
-@dataclass(eq=False)
-class _Arm:
-    """A direction in which a curve leaves a meeting, and its number once it was followed."""
-
-    start: EventPoint
-    direction: Array
-    curve: int = -1
-
-
-@dataclass
-class _Meeting:
-    at: EventPoint
-    kind: MeetingKind
-    new: Face = ()
-    arms: list[_Arm] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+_Meeting: TypeAlias = Node[EventPoint, MeetingKind]
 
 
 def _meeting(course: Course[EventPoint]) -> _Meeting:
     """Return the meeting at the end of a curve."""
     at, t, m = course.last, course.tangent, course.last.system.problem.inequalities
     if course.stop not in {Stop.EVENT, Stop.FLAT}:
-        return _Meeting(at, MeetingKind.UNDECIDED, notes=[course.stop.value])
+        return Node(at, MeetingKind.UNDECIDED, notes=[course.stop.value])
     new = np.flatnonzero(abs(at.watched()[0]) <= at.system.tolerances.same)
     if (new > m).any():
-        return _Meeting(at, MeetingKind.END)
-    both = [_Arm(at, t), _Arm(at, -t)]
+        return Node(at, MeetingKind.END)
+    both = [Arm(at, t), Arm(at, -t)]
     if course.stop is Stop.EVENT:
         return _crossing(at, tuple(new.tolist()))
     if at.flat == FOLD and abs(at.bend) <= at.system.tolerances.near:
-        return _Meeting(at, MeetingKind.CUSP, arms=both)
+        return Node(at, MeetingKind.CUSP, arms=both)
     if at.flat:
         return _two_flat(at, both)
     known = [abs(some).min(initial=math.inf) for some in at.spectra()]
     return _fold_at(at, at.subsets[int(np.argmin(known))], both)
 
 
-def _fold_at(at: EventPoint, held: Face, arms: list[_Arm]) -> _Meeting:
+def _fold_at(at: EventPoint, held: Face, arms: list[Arm[EventPoint]]) -> _Meeting:
     """Return the meeting of a contact change with the folds that hold some of its functions."""
-    node = _Meeting(at, MeetingKind.FOLD_AT_CONTACT, at.own, arms)
+    node = Node(at, MeetingKind.FOLD_AT_CONTACT, at.own, arms)
     face = tuple(sorted({*at.face, *held}))
     for flat in (FOLD, SYMMETRIC) if len(at.own) > 1 else (FOLD,):
         found = list(_leaving(_on(at, face, (), flat), at.own, node))
@@ -91,15 +75,15 @@ def _fold_at(at: EventPoint, held: Face, arms: list[_Arm]) -> _Meeting:
     return node
 
 
-def _two_flat(at: EventPoint, arms: list[_Arm]) -> _Meeting:
+def _two_flat(at: EventPoint, arms: list[Arm[EventPoint]]) -> _Meeting:
     """Return the meeting of folds with branch points of a symmetry."""
-    node = _Meeting(at, MeetingKind.FOLD_AT_BRANCH, arms=arms)
+    node = Node(at, MeetingKind.FOLD_AT_BRANCH, arms=arms)
     flat = FOLD + SYMMETRIC - at.flat
     other = EventPoint(at.system, at.face, at.x, (), flat, at.across())
     # The direction of the odd curvature is one of the folds' Jacobian as well.
     odd = other if flat == SYMMETRIC else at
     t = np.linalg.svd(np.vstack([other.jacobian, odd.right]))[2][-1]
-    node.arms += [_Arm(other, t), _Arm(other, -t)]
+    node.arms += [Arm(other, t), Arm(other, -t)]
     return node
 
 
@@ -110,12 +94,10 @@ def _crossing(at: EventPoint, new: Face) -> _Meeting:
     if at.flat:
         base = _on(at, tuple(i for i in at.face if i not in new), new, 0)
         t = base.tangent()
-        node = _fold_at(
-            base, tuple(i for i in new if i in at.face), [_Arm(base, t), _Arm(base, -t)]
-        )
+        node = _fold_at(base, tuple(i for i in new if i in at.face), [Arm(base, t), Arm(base, -t)])
         node.kind = kind if kind is MeetingKind.DEPENDENT else node.kind
         return node
-    node = _Meeting(at, kind, tuple(sorted({*at.own, *new})))
+    node = Node(at, kind, tuple(sorted({*at.own, *new})))
     firm = {*at.face}.difference(new)
     for own, rest in ((at.own, new), (new, at.own)):
         functions = [i for i in rest if i < m]
@@ -131,7 +113,7 @@ def _on(at: EventPoint, face: Face, own: Face, flat: int) -> EventPoint:
     return EventPoint(at.system, face, x, own, flat)
 
 
-def _leaving(start: EventPoint, rest: Face, node: _Meeting) -> Iterator[_Arm]:
+def _leaving(start: EventPoint, rest: Face, node: _Meeting) -> Iterator[Arm[EventPoint]]:
     """Yield the directions of a curve along which some functions or multipliers grow."""
     tolerances = start.system.tolerances
     sizes, vectors = start.kernel() if start.finite else (np.zeros(2), np.zeros((1, 1)))
@@ -142,78 +124,53 @@ def _leaving(start: EventPoint, rest: Face, node: _Meeting) -> Iterator[_Arm]:
     if (abs(rates) <= tolerances.same).any():
         node.notes.append("something vanishes to second order")
     elif (rates > 0).all() or (rates < 0).all():
-        yield _Arm(start, -vectors[0] if (rates < 0).any() else vectors[0])
+        yield Arm(start, -vectors[0] if (rates < 0).any() else vectors[0])
 
 
-@dataclass
-class _Curve:
-    points: list[EventPoint]
-    ends: list[int]
-
-
-class _CurveSearch:
+class _CurveSearch(Network[EventPoint, MeetingKind]):
     def __init__(self, options: WalkOptions) -> None:
-        self.options = options
-        self.meetings: list[_Meeting] = []
-        self.curves: list[_Curve] = []
+        super().__init__(options, math.inf)
         self.lost = False
-
-    def tasks(self, starts: list[EventPoint], most: int) -> Iterator[Task]:
-        """Yield the curves to be followed: through the starts, then those that leave meetings."""
-        for start in starts:
-            yield len(self.curves) < most, partial(self._begin, start)
-        while True:
-            waiting = ((k, a) for k, m in enumerate(self.meetings) for a in m.arms if a.curve < 0)
-            first = next(waiting, None)
-            if first is None:
-                return
-            yield len(self.curves) < most, partial(self._leave, *first)
 
     def told(self) -> tuple[float, float | None, str]:
         """Return how far the search has come."""
         return len(self.curves), None, "curves"
 
-    def _begin(self, at: EventPoint) -> None:
-        if any(self._passes(curve, at) for curve in self.curves):
-            return
-        back, on = (follow(at, side * at.tangent(), self.options) for side in (-1.0, 1.0))
-        if back.stop is Stop.CLOSED:
-            self.curves.append(_Curve(back.points, [-1, -1]))
-            return
+    def add(self, back: Course[EventPoint], on: Course[EventPoint]) -> None:
+        """Add a curve that was followed both ways, if it was."""
         if len(back.points) == len(on.points) == 1:
             self.lost = True
-            return
-        self.curves.append(_Curve([*back.points[::-1], *on.points[1:]], [-1, -1]))
-        for end, course in enumerate((back, on)):
-            self._arrive(course, len(self.curves) - 1, end)
+        else:
+            super().add(back, on)
 
-    def _leave(self, k: int, arm: _Arm) -> None:
-        course = follow(arm.start, arm.direction, self.options)
+    def leave(self, k: int, arm: Arm[EventPoint]) -> None:
+        """Follow an arm of a meeting, and forget it where that is not possible."""
+        course = self.follow(arm.start, arm.direction)
         if len(course.points) == 1:
-            self.meetings[k].notes.append(
-                f"a curve that leaves is not followed: {course.stop.value}"
-            )
-            self.meetings[k].arms.remove(arm)
+            note = f"a curve that leaves is not followed: {course.stop.value}"
+            self.nodes[k].notes.append(note)
+            self.nodes[k].arms.remove(arm)
             return
         arm.curve = len(self.curves)
-        self.curves.append(_Curve(course.points, [k, -1]))
-        self._arrive(course, arm.curve, 1)
+        self.curves.append(Curve(course.points, [k, -1]))
+        self.arrive(course, arm.curve, 1)
 
-    def _arrive(self, course: Course[EventPoint], curve: int, end: int) -> None:
+    def arrive(self, course: Course[EventPoint], curve: int, end: int) -> None:
+        """Register the end of a curve at a meeting, a new one or one that is known."""
         at, back, near = course.last, -course.tangent, course.last.system.tolerances.near
-        known = (k for k, node in enumerate(self.meetings) if node.at.apart(at) <= near)
-        k = next(known, len(self.meetings))
-        if k == len(self.meetings):
-            self.meetings.append(_meeting(course))
+        known = (k for k, node in enumerate(self.nodes) if node.at.apart(at) <= near)
+        k = next(known, len(self.nodes))
+        if k == len(self.nodes):
+            self.nodes.append(_meeting(course))
         self.curves[curve].ends[end] = k
-        arms, alike = self.meetings[k].arms, math.cos(self.options.turn)
+        arms, alike = self.nodes[k].arms, math.cos(self.options.turn)
         for arm in arms:
             if arm.curve < 0 and arm.start.alike(at) and arm.direction @ back > alike:
                 arm.curve = curve
                 return
-        arms.append(_Arm(at, back, curve))
+        arms.append(Arm(at, back, curve))
 
-    def _passes(self, curve: _Curve, at: EventPoint) -> bool:
+    def passes(self, curve: Curve[EventPoint], at: EventPoint) -> bool:
         """Whether a curve goes through a point."""
         if not curve.points[0].alike(at):
             return False
@@ -233,16 +190,16 @@ class _CurveSearch:
         for curve in self.curves:
             if _key(curve.points[0]) > _key(curve.points[-1]):
                 curve.points, curve.ends = curve.points[::-1], curve.ends[::-1]
-        curves, meetings = self.curves, self.meetings
+        curves, meetings = self.curves, self.nodes
         order = sorted(
             range(len(curves)), key=lambda k: [_key(curves[k].points[i]) for i in (0, -1, 1)]
         )
         places = sorted(range(len(meetings)), key=lambda k: _key(meetings[k].at))
         self.curves = [curves[k] for k in order]
-        self.meetings = [meetings[k] for k in places]
+        self.nodes = [meetings[k] for k in places]
         for curve in self.curves:
             curve.ends = [places.index(end) if end >= 0 else end for end in curve.ends]
-        for node in self.meetings:
+        for node in self.nodes:
             for arm in node.arms:
                 arm.curve = order.index(arm.curve) if arm.curve >= 0 else arm.curve
 
@@ -344,10 +301,10 @@ def event_curves(
                 starts += found if exchanged else found[:1]
                 declined |= len(found) < 1 + exchanged
     search = _CurveSearch(options or WalkOptions())
-    told = search.tasks(starts, max_curves)
+    told = search.tasks(max_curves, starts)
     ending = work_through(told, search.told, progress, seconds=max_seconds)
     search.sort()
-    done = ending is Ending.FINISHED and not any(node.notes for node in search.meetings)
+    done = ending is Ending.FINISHED and not any(node.notes for node in search.nodes)
     lows = np.array([interval[0] for interval in rectangle])
     units = np.array([(high - low) / system.length for low, high in rectangle]) if starts else lows
     curves = [_stated(curve, lows, units) for curve in search.curves]
@@ -361,11 +318,11 @@ def event_curves(
                 kind=node.kind,
                 parameters=lows + node.at.both * units,
                 point=node.at.system.manifold.canonical(node.at.system.place(node.at.u)),
-                functions=_named(node.at, node.new),
+                functions=_named(node.at, node.weak),
                 curves=tuple(sorted(arm.curve for arm in node.arms if arm.curve >= 0)),
                 note="; ".join(dict.fromkeys(node.notes)),
             )
-            for node in search.meetings
+            for node in search.nodes
         ),
         closed=done and not declined and not search.lost,
     )
@@ -385,7 +342,7 @@ def _named(at: FritzJohn, rows: Face) -> tuple[str, ...]:
     return tuple(functions[i].name for i in rows if i < at.system.problem.inequalities)
 
 
-def _stated(curve: _Curve, lows: Array, units: Array) -> EventCurve:
+def _stated(curve: Curve[EventPoint], lows: Array, units: Array) -> EventCurve:
     """Return a curve in terms of the user."""
     n, points = curve.points[0].system.n, curve.points
     # What happens is asked for where the curve moves most in the plane.

@@ -24,8 +24,8 @@ directions across all ``df_i``, ``D`` is a single point there: a component vanis
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from itertools import chain, combinations
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,8 @@ from numpy.typing import NDArray
 from polycorner.branches.branching import branch_point, curves
 from polycorner.branches.continuation import Course, Stop, corrected
 from polycorner.branches.diagram import BranchKind
-from polycorner.branches.system import Face, FritzJohn
+from polycorner.branches.network import Arm, Node
+from polycorner.branches.system import FritzJohn
 from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.polyhedra.strata import local_pieces
 from polycorner.spaces.manifold import Array
@@ -42,37 +43,15 @@ from polycorner.spaces.manifold import Array
 TOLD = BranchKind.OPENS
 
 
-@dataclass
-class Arm:
-    """A direction in which an arc leaves an event from a point, and its number once followed."""
-
-    start: FritzJohn
-    direction: Array
-    arc: int = -1
-
-    @property
-    def face(self) -> Face:
-        """The functions that are held along the arc."""
-        return self.start.face
+Event: TypeAlias = Node[FritzJohn, BranchKind]
 
 
-@dataclass
-class Node:
-    """An event: where, of what kind, what vanishes, and the arcs that leave it."""
-
-    at: FritzJohn
-    kind: BranchKind
-    weak: tuple[int, ...] = ()
-    arms: list[Arm] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def decided(self) -> bool:
-        """Whether all that leaves it is known."""
-        return not self.notes and not (self.arms and kind_of(self) is BranchKind.UNDECIDED)
+def is_decided(node: Event) -> bool:
+    """Whether all that leaves an event is known."""
+    return not node.notes and not (node.arms and kind_of(node) is BranchKind.UNDECIDED)
 
 
-def event_at_end(way: Course[FritzJohn]) -> Node:
+def event_at_end(way: Course[FritzJohn]) -> Event:
     """Return the event at the end of a part of a curve."""
     at = way.last
     if way.stop is Stop.FAR:
@@ -86,8 +65,8 @@ def event_at_end(way: Course[FritzJohn]) -> Node:
     return weak_event(node.at) if vanish.any() else node
 
 
-def weak_event(at: FritzJohn, most: int = 10) -> Node:
-    """Return the event where functions vanish, or multipliers; of more than ``most`` it says so."""
+def weak_event(at: FritzJohn) -> Event:
+    """Return the event where functions vanish, or multipliers; of more than ten it says so."""
     system, m = at.system, at.system.problem.inequalities
     values, small = at.watched()[0], at.system.tolerances.same
     vanish = abs(values) <= small
@@ -96,8 +75,8 @@ def weak_event(at: FritzJohn, most: int = 10) -> Node:
     node = Node(at, BranchKind.END if ends else TOLD, weak)
     if ends and not weak:
         return node
-    if len(weak) > most:
-        node.notes.append(f"{len(weak)} functions vanish there, more than {most}")
+    if len(weak) > 10:
+        node.notes.append(f"{len(weak)} functions vanish there, more than 10")
         return node
     firm = set(at.face).difference(weak)
     # Relations of equations alone hold with either sign.
@@ -114,7 +93,7 @@ def weak_event(at: FritzJohn, most: int = 10) -> Node:
     return node
 
 
-def _exchange(node: Node) -> Node | None:
+def _exchange(node: Event) -> Event | None:
     """Return the event where contacts are exchanged; None if it is none, or not decided."""
     at, system = node.at, node.at.system
     rank, same = system.tolerances.rank, system.tolerances.same
@@ -148,7 +127,7 @@ def _exchange(node: Node) -> Node | None:
     return found
 
 
-def _leaving(here: FritzJohn, node: Node, also: NDArray[np.intp]) -> Iterator[Arm]:
+def _leaving(here: FritzJohn, node: Event, also: NDArray[np.intp]) -> Iterator[Arm[FritzJohn]]:
     """Yield the arcs of a face that leave an event where functions vanish."""
     system, m = here.system, here.system.problem.inequalities
     t = here.only_tangent()
@@ -176,7 +155,7 @@ def _leaving(here: FritzJohn, node: Node, also: NDArray[np.intp]) -> Iterator[Ar
             yield Arm(here, side * t)
 
 
-def flat_event(at: FritzJohn, t: Array) -> Node:
+def flat_event(at: FritzJohn, t: Array) -> Event:
     """Return the event where a curvature along the face vanishes, with the tangent of arrival."""
     if at.is_fold(t):
         return Node(at, BranchKind.FOLD, arms=[Arm(at, at.tangent(t))])
@@ -204,7 +183,7 @@ def _is_line(at: FritzJohn) -> bool:
     return found is not None and bool(np.linalg.norm(found.u - at.u) > distance / 2)
 
 
-def kind_of(node: Node) -> BranchKind:
+def kind_of(node: Event) -> BranchKind:
     """Return the kind of an event, by what leaves it."""
     if node.kind is not TOLD:
         return node.kind

@@ -9,14 +9,14 @@ the odd ones are odd.  In *adapted* coordinates ``y`` each of the two is a place
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from polycorner import checks
 from polycorner.branches.diagram import Arc, BranchKind, Diagram
 from polycorner.branches.system import Face
-from polycorner.intervals.balls import ball
+from polycorner.intervals.balls import Ball, ball
 from polycorner.minimisation.methods import stationary_on
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.symmetry import Symmetry
@@ -24,9 +24,6 @@ from polycorner.proofs.lists.images import Motion, functions_moved, motion, perm
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True)
@@ -70,14 +67,8 @@ class Mirror:
     ) -> "Mirror | None":
         """Return what an image is on a face; None unless it is an involution there.
 
-        Parameters
-        ----------
-        g : Image
-        face : tuple of int
-        dimension : int
-            Of coordinates and parameters, which come before the multipliers.
-        equations : sequence of int
-            Numbers of the equations that are held.
+        ``dimension`` coordinates and parameters come before the multipliers; ``equations`` are the
+        numbers of those that are held.
         """
         n, moved = len(g.order), [g.functions[i] for i in face]
         turned = [g.equations[j] for j in equations]
@@ -151,15 +142,8 @@ def _halved(x: "Sequence[Ball]", pairs: tuple[tuple[int, int, int], ...]) -> "li
 def images(lifted: Problem, symmetry: Symmetry, diagram: Diagram, most: int) -> list[Image]:
     """Return finite symmetries for all values of the parameters: those given, those found.
 
-    Parameters
-    ----------
-    lifted : Problem
-        With the formulas' parameters as further coordinates.
-    symmetry : Symmetry
-    diagram : Diagram
-        Whose branch points suggest others.
-    most : int
-        Signed permutations that are tried for two arcs, at most.
+    ``lifted`` has the formulas' parameters as further coordinates.  Branch points of the diagram
+    suggest what is found, by ``most`` signed permutations for two arcs at most.
 
     Raises
     ------

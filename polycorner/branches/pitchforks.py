@@ -24,7 +24,7 @@ regular beside the branch point.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import dropwhile
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -36,12 +36,16 @@ from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.branches.tubes import CurveSystem, Setting, Tube, point
 from polycorner.intervals.balls import (
+    Ball,
     ball,
+    balls,
     column,
     dot,
     entries,
+    left_inverse,
     matrix,
     middle_inverse,
+    middles,
     midpoints,
     square,
 )
@@ -49,11 +53,9 @@ from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.definite import is_regular
 from polycorner.proofs.kkt import Enclosure, Linearisation, enclose, newton
+from polycorner.proofs.witnesses import need
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +234,7 @@ class Pitchfork:
     def is_trunk(self, points: Sequence[Array], tolerance: float) -> bool:
         """Whether approximate points are symmetric."""
         mirror, units = self.divided.mirror, self.divided.system.units
-        parts = (mirror.parts(_balls(x)) for x in points)
+        parts = (mirror.parts(balls(x)) for x in points)
         return all(abs(y[j]) <= tolerance * units[j] for y in parts for j in mirror.odd)
 
     def cut(
@@ -246,25 +248,25 @@ class Pitchfork:
         even = self.is_trunk(points, tolerance)
         (reach,) = self.trunk.enclosure.predictor.cell.reach if even else (self.divided.eps,)
         far = reach.upper() * options.inside
-        outer = list(dropwhile(lambda x: not abs(self.place(_balls(x), even=even)) > far, course))
+        outer = list(dropwhile(lambda x: not abs(self.place(balls(x), even=even)) > far, course))
         if not outer:
             return []
-        at = far if self.place(_balls(outer[0]), even=even) > 0 else -far
+        at = far if self.place(balls(outer[0]), even=even) > 0 else -far
         if even:
             line = self.trunk.enclosure.predictor.tangents
             near = [x + t[0] * at for x, t in zip(self.where, line, strict=True)]
         else:
             near = self.divided.mirror.point(midpoints(self.arms.solution), at)
-        middle = np.array([float(x.mid()) for x in near])
-        found = newton(self.pinned(middle, even=even), _balls(middle), bits=options.bits)
+        middle = middles(near)
+        found = newton(self.pinned(middle, even=even), balls(middle), bits=options.bits)
         if isinstance(found, Undecided):
             return []
-        course = [np.array([float(x.mid()) for x in found]), *outer]
+        course = [middles(found), *outer]
         return course if side == 0 else course[::-1]
 
     def beside(self, x: Array, *, even: bool, bits: int) -> "list[Ball]":
         """Return the point of trunk or arms beside an approximate one, or the branch point."""
-        found = point(self.pinned(x, even=even), _balls(x), bits)
+        found = point(self.pinned(x, even=even), balls(x), bits)
         if isinstance(found, Undecided):
             return self.where
         shown = self.trunk.contains if even else self.covers
@@ -278,17 +280,13 @@ class Pitchfork:
             even = self.is_trunk(end.arc.nodes, tolerance)
             x = self.beside(end.near, even=even, bits=bits)
             place = self.place(x, even=even)
-            if place.contains(0) or not end.holds(x):
-                return EnclosedEvent([], reason="an arc is not shown to come from the branch point")
-            if left.pop((even, 1 if place > 0 else -1), None) != end.side:
-                return EnclosedEvent([], reason="its arcs are not those of a pitchfork")
-        if left:
-            return EnclosedEvent(
-                [], reason="an arc leaves a pitchfork, which is not in the diagram"
-            )
-        return EnclosedEvent(
-            self.where[: len(self.divided.system.setting.units)], BranchKind.BRANCH
-        )
+            comes = not place.contains(0) and end.holds(x)
+            need(comes, "an arc is not shown to come from the branch point")
+            side = left.pop((even, 1 if place > 0 else -1), None)
+            need(side == end.side, "its arcs are not those of a pitchfork")
+        need(not left, "an arc leaves a pitchfork, which is not in the diagram")
+        where = self.where[: len(self.divided.system.setting.units)]
+        return EnclosedEvent(where, BranchKind.BRANCH)
 
 
 def pitchfork(
@@ -307,7 +305,7 @@ def pitchfork(
     if mirror is None:
         return Undecided(subject, "no symmetry that is an involution keeps its active functions")
     system = CurveSystem(setting, face).coordinate(0)
-    y, apart = mirror.parts(_balls(at)), [mirror.parts(_balls(x)) for x in near]
+    y, apart = mirror.parts(balls(at)), [mirror.parts(balls(x)) for x in near]
     sizes = [(abs(float(off[j].mid())) / system.units[j], j, k)
              for k, off in enumerate(apart) for j in mirror.odd if j < setting.n]  # fmt: skip
     size, way, k = max(sizes, default=(0.0, 0, 0))
@@ -374,7 +372,7 @@ def _trunk(
     if along is None:
         return None
     along *= np.sign(along[setting.moved] * float(setting.rates[setting.moved - setting.n]))
-    middle = np.array([float(v.mid()) for v in x])
+    middle = middles(x)
     for _ in range(options.halvings):
         found = about_event(system, middle, along, reach, options.bits)
         reach /= 2
@@ -417,16 +415,13 @@ def _kernel(divided: Divided, rows: "list[list[Ball]]", y: "Sequence[Ball]") -> 
     others, hull = sorted(mirror.odd - {way}), list(y)
     hull[way] = ball(1)
     if others:
-        places = [
-            (j, row)
-            for (_, j, _), (_, row, _) in zip(mirror.unknowns, mirror.equations, strict=True)
-        ]
+        pairs = zip(mirror.unknowns, mirror.equations, strict=True)
+        places = [(j, row) for (_, j, _), (_, row, _) in pairs]
         table = [[units[j] * rows[r][c] * units[c] for c in others] for j, r in places]
         right = column([-units[j] * rows[r][way] for j, r in places])
-        middle = np.array([[float(b.mid()) for b in row] for row in table])
-        if not np.isfinite(middle).all():
+        left = left_inverse(table)
+        if left is None:
             return []
-        left = matrix(np.linalg.pinv(middle).tolist())
         try:
             found = entries((left * matrix(table)).solve(left * right))
         except ZeroDivisionError:
@@ -434,7 +429,3 @@ def _kernel(divided: Divided, rows: "list[list[Ball]]", y: "Sequence[Ball]") -> 
         for c, x in zip(others, found, strict=True):
             hull[c] = x * units[c]
     return hull
-
-
-def _balls(x: Array) -> "list[Ball]":
-    return [ball(v) for v in x.tolist()]

@@ -4,13 +4,14 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from polycorner import checks
-from polycorner.branches.covering import Cover, all_tubes
+from polycorner.branches.covering import Cover, event_tubes
 from polycorner.branches.diagram import Arc, BranchEvent, BranchKind, Diagram
 from polycorner.branches.enclosed_arcs import EnclosedArc, Watched, enclosed_arc
 from polycorner.branches.enclosed_events import (
@@ -24,7 +25,7 @@ from polycorner.branches.pitchforks import Pitchfork, pitchfork
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.saving import Evidence, ProvedArc, save_proof
 from polycorner.branches.tubes import PIN, CurveSystem, Setting, Tube, point
-from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.balls import Ball, ball, balls, middles, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.kinds import checked
@@ -35,12 +36,10 @@ from polycorner.printing import Printed, Sheet, facts, listed, number
 from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.faces import outward
+from polycorner.proofs.witnesses import UnshownError, decided, need
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
 from polycorner.values import Checked
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 Interval = tuple[float, float]
 
@@ -213,7 +212,6 @@ def prove_branches(
     TypeError, ValueError
         For diagrams of unions and on manifolds with unit vectors.
     """
-    checks.instance("diagram", diagram, Diagram)
     d = diagram.problem.polyhedron
     if d.is_union or d.manifold.factors or diagram.problem.is_sparse:
         expected = "one of an intersection, on lines and circles, of few coordinates"
@@ -320,13 +318,10 @@ class _Prover:
         number_of_event = self.diagram.arcs[k].events[side]
         kind = self.diagram.events[number_of_event].kind if number_of_event >= 0 else None
         values = self.setting.formulas.values(
-            Box([ball(value) for value in x[: len(self.setting.units)].tolist()]),
+            Box(balls(x[: len(self.setting.units)])),
             range(watched.inequalities),
         )
-        sizes = (
-            np.array([float(v.mid()) for v in values])
-            * self.setting.weights[:-1][: watched.inequalities]
-        )
+        sizes = middles(values) * self.setting.weights[:-1][: watched.inequalities]
         d = len(self.setting.units)
         sizes[list(face)] = x[d : d + len(face)]
         zeros = set(np.flatnonzero(abs(sizes) <= same).tolist())
@@ -346,10 +341,7 @@ class _Prover:
             return "it does not end at events"
         same, setting = self.tolerances.same, self.setting
         rows, d = found.tubes[0].system.rows, len(setting.units)
-        values = [
-            float(setting.formulas.values(Box([ball(x) for x in q.tolist()]), rows[-1:])[0].mid())
-            for q in places
-        ]
+        values = [float(setting.formulas.values(Box(balls(q)), rows[-1:])[0].mid()) for q in places]
         if not np.allclose(values, arc.energies, rtol=same, atol=same):
             return "its energies are not those of its points"
         points = np.array([null_unknowns(setting, found.face, place) for place in places])
@@ -368,7 +360,7 @@ class _Prover:
 
     def _on(self, found: EnclosedArc, x: Array) -> bool:
         """Whether a point is near the curve that is proved."""
-        near = [ball(value) for value in x.tolist()]
+        near = balls(x)
         for one in found.tubes:
             if not one.enclosure.predictor.cell.reach[0].contains(one.place(near)[0]):
                 continue
@@ -390,6 +382,12 @@ class _Prover:
 
     def event(self, k: int, arcs: Sequence[EnclosedArc]) -> EnclosedEvent:
         """Return what is shown of an event."""
+        try:
+            return self._shown(k, arcs)
+        except UnshownError as error:
+            return EnclosedEvent([], reason=str(error))
+
+    def _shown(self, k: int, arcs: Sequence[EnclosedArc]) -> EnclosedEvent:
         event = self.diagram.events[k]
         ends = [
             End(arcs[j], side)
@@ -397,28 +395,21 @@ class _Prover:
             for side in (0, 1)
             if arc.events[side] == k
         ]
-        if sorted(set(event.arcs)) != sorted(
-            {j for j, arc in enumerate(self.diagram.arcs) if k in arc.events}
-        ):
-            return EnclosedEvent([], reason="its arcs are not those that end there")
-        one = self.pitchforks.get(k)
-        if isinstance(one, Undecided):
-            return EnclosedEvent([], reason=str(one))
+        own = {j for j, arc in enumerate(self.diagram.arcs) if k in arc.events}
+        need(set(event.arcs) == own, "its arcs are not those that end there")
+        one = decided(self.pitchforks.get(k))
         if one is not None:
             found = one.event(ends, self.tolerances.near, self.options.bits)
         else:
             found = enclosed_event(self.setting, ends, self.watched, self.options)
-        if not found.reason and found.kind is not event.kind:
-            return EnclosedEvent([], reason=f"it is of the kind {found.kind.name}")
+        need(found.kind is event.kind, f"it is of the kind {found.kind.name}")
         low, high = self.times(k, found)
         same = self.tolerances.same * (1 + abs(event.parameter))
-        if not low - same <= event.parameter <= high + same:
-            return EnclosedEvent([], reason=f"it is at {low:.9g}")
-        if found.where:
-            at = np.array([float(x.mid()) for x in found.where[: self.setting.n]])
-            apart = self.problem.polyhedron.manifold.difference(at, event.point)
-            if (abs(apart) > self.tolerances.near * self.problem.scales).any():
-                return EnclosedEvent([], reason="its point is another one")
+        need(low - same <= event.parameter <= high + same, f"it is at {low:.9g}")
+        at = middles(found.where[: self.setting.n])
+        apart = abs(self.problem.polyhedron.manifold.difference(at, event.point))
+        here = (apart <= self.tolerances.near * self.problem.scales).all()
+        need(here, "its point is another one")
         return found
 
     def others(
@@ -431,7 +422,10 @@ class _Prover:
         """Return boxes in which there may be equilibria that are not on the arcs."""
         interval = self.diagram.interval
         tubes: list[Tube | Pitchfork] = [
-            *all_tubes(self.setting, arcs, events, self.watched, self.options),
+            *(tube for arc in arcs for tube in arc.tubes),
+            *chain.from_iterable(
+                event_tubes(self.setting, event, self.watched, self.options) for event in events
+            ),
             *(one for one in self.pitchforks.values() if isinstance(one, Pitchfork)),
         ]
         lifted = lifted_problem(self.problem, tuple(self.diagram.rates))

@@ -1,63 +1,44 @@
 """The search for all arcs of equilibria that are connected with given ones."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from polycorner import checks
-from polycorner.branches.continuation import Course, Stop, corrected, follow
+from polycorner.branches.continuation import Course, corrected
 from polycorner.branches.diagram import Arc, BranchEvent, BranchKind, Diagram
 from polycorner.branches.events import (
     TOLD,
-    Arm,
-    Node,
+    Event,
     event_at_end,
     flat_event,
+    is_decided,
     kind_of,
     weak_event,
 )
+from polycorner.branches.network import Arm, Curve, Network
 from polycorner.branches.posing import posed
-from polycorner.branches.system import Face, FritzJohn, FritzJohnSystem
+from polycorner.branches.system import FritzJohn, FritzJohnSystem
 from polycorner.kinds import checked
 from polycorner.minimisation.certificate import Certificate
 from polycorner.polyhedra.quotients import WalkOptions
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.searches import Ending, Task, work_through
+from polycorner.searches import Ending, work_through
 
 
-@dataclass
-class _Edge:
-    """An arc: the points on it, and the events at its ends; -1 where there is none."""
-
-    face: Face
-    points: list[FritzJohn]
-    ends: list[int]
-
-
-class _BranchSearch:
+class _BranchSearch(Network[FritzJohn, BranchKind]):
     def __init__(self, system: FritzJohnSystem, options: WalkOptions, extent: float) -> None:
-        self.system, self.options, self.extent = system, options, extent
-        self.nodes: list[Node] = []
-        self.edges: list[_Edge] = []
+        super().__init__(options, extent)
+        self.system = system
 
     def begin(self, at: FritzJohn) -> None:
         """Follow the curve through an equilibrium both ways, as one arc."""
-        if any(self._passes(edge, at) for edge in self.edges):
-            return
-        if at.only_tangent() is None:
+        if at.only_tangent() is not None:
+            super().begin(at)
+        elif not any(self.passes(arc, at) for arc in self.curves):
             self.nodes.append(flat_event(at, at.tangent()))
-            return
-        back, on = (self._follow(at, side * at.tangent()) for side in (-1.0, 1.0))
-        if back.stop is Stop.CLOSED:
-            self.edges.append(_Edge(at.face, back.points, [-1, -1]))
-            return
-        self.edges.append(_Edge(at.face, [*back.points[::-1], *on.points[1:]], [-1, -1]))
-        for end, way in enumerate((back, on)):
-            self._arrive(way, len(self.edges) - 1, end)
 
     def begin_at_event(self, at: FritzJohn) -> None:
         """Take an equilibrium on which functions vanish without a multiplier."""
@@ -67,32 +48,12 @@ class _BranchSearch:
         if self._known(node) is None:
             self.nodes.append(node)
 
-    def tasks(self, most: int) -> Iterator[Task]:
-        """Yield the arcs that leave events and were not followed yet, to be followed."""
-        while True:
-            waiting = (
-                (k, arm) for k, node in enumerate(self.nodes) for arm in node.arms if arm.arc < 0
-            )
-            first = next(waiting, None)
-            if first is None:
-                return
-            yield len(self.edges) < most, partial(self._leave, *first)
-
     def told(self) -> tuple[float, float | None, str]:
         """Return how far the search has come."""
-        waiting = sum(arm.arc < 0 for node in self.nodes for arm in node.arms)
-        return len(self.edges), len(self.edges) + waiting, "arcs"
+        waiting = sum(arm.curve < 0 for node in self.nodes for arm in node.arms)
+        return len(self.curves), len(self.curves) + waiting, "arcs"
 
-    def _follow(self, at: FritzJohn, direction: np.ndarray) -> Course[FritzJohn]:
-        return follow(at, direction, self.options, extent=self.extent)
-
-    def _leave(self, k: int, arm: Arm) -> None:
-        way = self._follow(arm.start, arm.direction)
-        arm.arc = len(self.edges)
-        self.edges.append(_Edge(arm.face, way.points, [k, -1]))
-        self._arrive(way, arm.arc, 1)
-
-    def _arrive(self, way: Course[FritzJohn], edge: int, end: int) -> None:
+    def arrive(self, way: Course[FritzJohn], edge: int, end: int) -> None:
         """Register the end of an arc at an event, a new one or one that is known."""
         node, back, face = event_at_end(way), -way.tangent, way.last.face
         k = self._known(node)
@@ -100,22 +61,22 @@ class _BranchSearch:
             k = len(self.nodes)
             self.nodes.append(node)
         node = self.nodes[k]
-        self.edges[edge].ends[end] = k
+        self.curves[edge].ends[end] = k
         alike = math.cos(self.options.turn)
         if node.kind is BranchKind.BRANCH:
             back = _backwards(way, node.at)
         if node.at.face == face:
-            self.edges[edge].points[-end] = node.at
+            self.curves[edge].points[-end] = node.at
         arms = [arm for arm in node.arms if arm.face == face and arm.direction @ back > alike]
         best = max(arms, key=lambda arm: float(arm.direction @ back), default=None)
-        if best is not None and best.arc < 0:
-            best.arc = edge
+        if best is not None and best.curve < 0:
+            best.curve = edge
             return
         if best is not None or node.kind is BranchKind.BRANCH:
             node.notes.append("an arc arrives along a curve that is not known to leave")
         node.arms.append(Arm(way.last, back, edge))
 
-    def _known(self, node: Node) -> int | None:
+    def _known(self, node: Event) -> int | None:
         near = self.system.tolerances.corner
         for k, other in enumerate(self.nodes):
             alike = other.weak == node.weak and other.kind is node.kind
@@ -123,10 +84,10 @@ class _BranchSearch:
                 return k
         return None
 
-    def _passes(self, edge: _Edge, at: FritzJohn) -> bool:
+    def passes(self, edge: Curve[FritzJohn], at: FritzJohn) -> bool:
         """Whether an arc goes through a point."""
         for one, two in zip(edge.points, edge.points[1:], strict=False):
-            if edge.face != at.face or not (one.s - at.s) * (two.s - at.s) <= 0:
+            if one.face != at.face or not (one.s - at.s) * (two.s - at.s) <= 0:
                 continue
             part = (at.s - one.s) / ((two.s - one.s) or 1.0)
             pin = self.system.towards(at.x)
@@ -138,13 +99,13 @@ class _BranchSearch:
     def contract(self) -> None:
         """Join events that an arc of no length connects, and arcs where nothing happens."""
         n, same = self.system.n, self.system.tolerances.same
-        for k, edge in enumerate(self.edges):
+        for k, edge in enumerate(self.curves):
             one, two = edge.ends
             places = np.array([p.x[: n + 1] for p in edge.points])
             extent = np.ptp(places, axis=0).max()
             if one == two >= 0 and extent <= self.system.tolerances.near:
                 # No step was possible, or only such that led nowhere: a note says so.
-                self.nodes[one].arms = [arm for arm in self.nodes[one].arms if arm.arc != k]
+                self.nodes[one].arms = [arm for arm in self.nodes[one].arms if arm.curve != k]
                 edge.points = []
                 continue
             if min(one, two) < 0 or one == two or extent > same:
@@ -154,37 +115,32 @@ class _BranchSearch:
             kept.at = min(kept.at, gone.at, key=lambda at: abs(float(at.x[-1])))
             kept.weak = tuple(sorted({*kept.weak, *gone.weak}))
             kept.notes += gone.notes
-            kept.arms = [arm for arm in (*kept.arms, *gone.arms) if arm.arc != k]
+            kept.arms = [arm for arm in (*kept.arms, *gone.arms) if arm.curve != k]
             gone.arms, gone.notes, edge.points = [], [], []
             self._redirect(two, one)
         for k, node in enumerate(self.nodes):
             arms = node.arms
             nothing = node.kind is TOLD and not node.notes and len(arms) == 2
-            if nothing and arms[0].face == arms[1].face and arms[0].arc != arms[1].arc:
-                self._join(k, arms[0].arc, arms[1].arc)
+            if nothing and arms[0].face == arms[1].face and arms[0].curve != arms[1].curve:
+                self._join(k, arms[0].curve, arms[1].curve)
 
     def _redirect(self, old: int, new: int) -> None:
-        for edge in self.edges:
+        for edge in self.curves:
             edge.ends = [new if end == old else end for end in edge.ends]
 
     def _join(self, k: int, one: int, two: int) -> None:
         """Append an arc to another at an event where nothing happens."""
-        first, second = self.edges[one], self.edges[two]
+        first, second = self.curves[one], self.curves[two]
         if first.ends[0] == k:
             first.points, first.ends = first.points[::-1], first.ends[::-1]
         if second.ends[1] == k:
             second.points, second.ends = second.points[::-1], second.ends[::-1]
-        first.points, first.ends = (
-            [*first.points, *second.points[1:]],
-            [
-                first.ends[0],
-                second.ends[1],
-            ],
-        )
+        first.points += second.points[1:]
+        first.ends = [first.ends[0], second.ends[1]]
         second.points, self.nodes[k].arms = [], []
         for node in self.nodes:
             for arm in node.arms:
-                arm.arc = one if arm.arc == two else arm.arc
+                arm.curve = one if arm.curve == two else arm.curve
 
 
 def _backwards(way: Course[FritzJohn], end: FritzJohn) -> np.ndarray:
@@ -276,15 +232,19 @@ def branches(  # noqa: PLR0913 - keywords of one search
     rates = {parameter: 1.0} if isinstance(parameter, str) else dict(parameter)
     if not rates:
         checks.refuse("parameter", "a name, or names with rates", parameter)
-    system = _system(several[0], rates, (low, high), parameter, symmetry or Symmetry())
+    first, now = several[0], _value(several[0], rates, parameter)
+    if not low <= now <= high:
+        checks.refuse("interval", f"one that contains {now:g}, of the certificate", interval)
+    about = first.problem, [rates], [(low, high)], [now], first.point
+    system = posed(*about, symmetry or Symmetry(), first.tolerances)
     search = _BranchSearch(system, options or WalkOptions(), extent)
     for one in several:
         at = _start(system, one, rates, parameter, (low, high))
         search.begin_at_event(at) if one.found.weak else search.begin(at)
     ending = work_through(search.tasks(max_arcs), search.told, progress, seconds=max_seconds)
     search.contract()
-    done = ending is Ending.FINISHED and all(node.decided for node in search.nodes)
-    return _diagram(search, several[0], rates, parameter, (low, high), done)
+    done = ending is Ending.FINISHED and all(map(is_decided, search.nodes))
+    return _diagram(search, first, rates, parameter, (low, high), done)
 
 
 def interval_ends(given: object) -> tuple[float, float]:
@@ -304,21 +264,6 @@ def _value(
         return 0.0
     (value,) = certificate.problem.parameter_values[parameter]
     return float(value)
-
-
-def _system(
-    certificate: Certificate,
-    rates: Mapping[str, float],
-    interval: tuple[float, float],
-    parameter: str | Mapping[str, float],
-    symmetry: Symmetry,
-) -> FritzJohnSystem:
-    problem, (low, high) = certificate.problem, interval
-    now = _value(certificate, rates, parameter)
-    if not low <= now <= high:
-        checks.refuse("interval", f"one that contains {now:g}, of the certificate", interval)
-    q, tolerances = certificate.point, certificate.tolerances
-    return posed(problem, [rates], [interval], [now], q, symmetry, tolerances)
 
 
 def _start(
@@ -393,8 +338,8 @@ def _diagram(
     (low, high), length = interval, search.system.length
     # In an order that does not depend on the order in which they were found.
     kept = sorted(
-        (k for k, edge in enumerate(search.edges) if edge.points),
-        key=lambda k: _key(search.edges[k].points),
+        (k for k, edge in enumerate(search.curves) if edge.points),
+        key=lambda k: _key(search.curves[k].points),
     )
     shown = sorted(
         (k for k, node in enumerate(search.nodes) if node.arms or node.notes),
@@ -404,18 +349,18 @@ def _diagram(
     event_of = {k: j for j, k in enumerate(shown)}
     arcs = []
     for k in kept:
-        edge = search.edges[k]
+        edge = search.curves[k]
         points, ends = edge.points, edge.ends
         if points[0].s > points[-1].s:
             points, ends = points[::-1], ends[::-1]
-        rows = system.rows(edge.face)[:-1]
+        rows = system.rows(edge.points[0].face)[:-1]
         mu = np.array([p.mu for p in points])
         with np.errstate(divide="ignore", invalid="ignore"):
             lam = mu[:, rows] / mu[:, -1:] * system.sizes[-1] / system.sizes[rows]
         stated = {names[row]: lam[:, j] for j, row in enumerate(rows)}
         arcs.append(
             Arc(
-                active=tuple(names[i] for i in edge.face),
+                active=tuple(names[i] for i in edge.points[0].face),
                 parameters=np.interp([p.s for p in points], (0, length), (low, high)),
                 points=np.array([system.place(p.u) for p in points]),
                 multipliers=certificate.problem.stated(stated),
@@ -436,7 +381,7 @@ def _diagram(
                 before=tuple(names[i] for i in (arms[0] if arms else node.at).face),
                 after=tuple(names[i] for i in (arms[-1] if arms else node.at).face),
                 functions=tuple(names[i] for i in node.weak),
-                arcs=tuple(arc_of[arm.arc] for arm in arms if arm.arc in arc_of),
+                arcs=tuple(arc_of[arm.curve] for arm in arms if arm.curve in arc_of),
                 note="; ".join(dict.fromkeys(node.notes)),
             )
         )

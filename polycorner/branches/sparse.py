@@ -31,10 +31,7 @@ blocks: Any = scipy.sparse.block_array
 class SparseSystem(FritzJohnSystem):
     """The equations for all faces, of a problem whose parameters are no coordinates.
 
-    Attributes
-    ----------
-    names : tuple of str
-        The formulas' parameters that change.
+    ``names`` are those of the formulas' parameters that change.
     """
 
     names: tuple[str, ...] = ()

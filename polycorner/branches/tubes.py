@@ -16,7 +16,7 @@ points at which gradients become dependent are nothing special.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,9 @@ from polycorner.branches.mirrors import Image, Mirror
 from polycorner.branches.proof_options import BranchProofOptions
 from polycorner.branches.system import Face
 from polycorner.intervals.balls import (
+    Ball,
     ball,
+    balls,
     column,
     current_precision,
     dot,
@@ -47,9 +49,6 @@ from polycorner.proofs.kkt import (
 )
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 PIN = "the pin of a tube"  # the last input, which no formula reads
 
@@ -326,10 +325,7 @@ class CurveSystem:
 class Tube:
     """A piece of a curve, and a neighbourhood without any other.
 
-    Attributes
-    ----------
-    enclosure : Enclosure
-        Over the interval of ``delta``.
+    The enclosure is one over the interval of ``delta``.
     """
 
     enclosure: Enclosure
@@ -449,7 +445,7 @@ def tube(
 
 def tube_about(system: CurveSystem, middle: Array, reach: float, bits: int) -> Tube | Undecided:
     """Return the tube about an approximate point of the curve, for a reach of the pin."""
-    centre = newton(system, [ball(x) for x in middle.tolist()], [ball(0)], bits=bits)
+    centre = newton(system, balls(middle), [ball(0)], bits=bits)
     if isinstance(centre, Undecided):
         return centre
     cell = Cell([ball(0)], [ball(0, reach)])
@@ -472,7 +468,7 @@ def point(system: Equations, near: "Sequence[Ball]", bits: int) -> Enclosure | U
 def joined(one: Tube, two: Tube, at: Array, bits: int) -> bool:
     """Whether two tubes are pieces of one curve, run through in the same sense near a point."""
     system = one.system.pinned(one.system.normal, at.tolist())
-    shared = point(system, [ball(x) for x in at.tolist()], bits)
+    shared = point(system, balls(at), bits)
     if isinstance(shared, Undecided):
         return False
     # On a whole tube near a branch point the derivative's enclosure is too wide to have a sign.

@@ -17,6 +17,9 @@ from math import ceil
 from threading import RLock
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from polycorner.formulas.operations import OPERATIONS, Operation
 from polycorner.formulas.programs import Payload
 
@@ -91,6 +94,11 @@ def constant(value: Payload) -> Ball:
 # ---------------------------------------------------------------------------------- linear algebra
 
 
+def balls(numbers: NDArray[np.float64]) -> "list[Ball]":
+    """Return numbers as balls without radius."""
+    return [ball(x) for x in numbers.tolist()]
+
+
 def matrix(rows: "Sequence[Sequence[Any]]") -> Matrix:
     """Return a matrix of balls."""
     from flint import arb_mat
@@ -116,6 +124,17 @@ def entries(vector: Matrix) -> "list[Ball]":
 def midpoints(balls: "Sequence[Ball]") -> "list[Ball]":
     """Return the midpoints, as balls without radius."""
     return [b.mid() for b in balls]
+
+
+def middles(balls: "Sequence[Any]") -> NDArray[np.float64]:
+    """Return the midpoints of balls, or of rows of balls, as doubles."""
+    return np.array([middles(x) if isinstance(x, list | tuple) else float(x.mid()) for x in balls])
+
+
+def left_inverse(rows: "Sequence[Sequence[Ball]]") -> "Matrix | None":
+    """Return an approximate pseudoinverse of a matrix's midpoint; None where it is not finite."""
+    middle = middles(rows)
+    return matrix(np.linalg.pinv(middle).tolist()) if np.isfinite(middle).all() else None
 
 
 def middle_inverse(rows: "Sequence[Sequence[Ball]]") -> "Matrix | None":

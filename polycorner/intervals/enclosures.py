@@ -20,14 +20,12 @@ from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph, Program
 from polycorner.formulas.translate import compile_expressions
-from polycorner.intervals.balls import ANALYTIC, constant, operations
+from polycorner.intervals.balls import ANALYTIC, Ball, constant, operations
 from polycorner.intervals.tapes import Box, Tape
 from polycorner.spaces.manifold import Manifold
 
 if TYPE_CHECKING:
     import sympy
-
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True)
@@ -108,14 +106,7 @@ def written(
 class Formulas:
     """Functions on a manifold, written into one graph whose only inputs are a box's sides.
 
-    Parameters
-    ----------
-    functions : sequence of SmoothFunction
-        The functions to evaluate.
-    manifold : Manifold
-        Their domain; its coordinates are the first inputs.
-    free : sequence of str, optional
-        Names of parameters that are inputs too, after the coordinates.
+    Inputs are the manifold's coordinates, then the parameters with the names in ``free``.
     """
 
     def __init__(

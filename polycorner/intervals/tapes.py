@@ -2,21 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from polycorner.formulas.programs import Graph, Payload
 from polycorner.intervals.balls import (
     ANALYTIC,
     PARTIALS,
+    Ball,
     constant,
     current_precision,
     dot,
     narrower,
     operations,
 )
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True, eq=False)

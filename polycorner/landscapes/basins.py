@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.landscapes.barriers import Landscape
 from polycorner.landscapes.steepest import steepest
 from polycorner.minimisation.abundance import share_interval
@@ -221,7 +222,7 @@ def basins(  # noqa: PLR0913 - all but two are options
     return _basins(points, known, ends)
 
 
-@shown
+@checked
 def minimum_of(
     landscape: Landscape,
     start: ArrayLike,
@@ -249,7 +250,6 @@ def minimum_of(
     TypeError, ValueError
         As for :func:`basins`.
     """
-    checks.instance("landscape", landscape, Landscape)
     q = landscape.problem.polyhedron.manifold.point(start, "start")
     found = basins(landscape, starts=q[None], stride=stride, symmetry=symmetry)
     end = int(found.ends[0])

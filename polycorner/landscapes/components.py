@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from polycorner.intervals.boxes import BoxFunctions
 from polycorner.minimisation.problem import Problem
 from polycorner.proofs.lists.domains import Domain
+from polycorner.proofs.lists.tree import bisected
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH
 from polycorner.values import Value
@@ -108,11 +109,7 @@ class Component(Value):
 class Components(Value):
     """Connected parts of ``S``.
 
-    Attributes
-    ----------
-    parts : tuple of Component
-    open : bool
-        Whether two may be parts of one component, or others may be missing.
+    They are ``open`` where two may be parts of one component, or others may be missing.
     """
 
     parts: tuple[Component, ...]
@@ -170,11 +167,7 @@ class _ComponentSearch:
         low, high, sides = low[~small], high[~small], sides[~small]
         if not len(low):
             return low, high
-        each, axis = np.arange(len(low)), self.along[sides.argmax(axis=1)]
-        middle = 0.5 * (low + high)[each, axis]
-        first, second = high.copy(), low.copy()
-        first[each, axis] = second[each, axis] = middle
-        return np.concatenate([low, second]), np.concatenate([first, high])
+        return bisected(low, high, self.along[sides.argmax(axis=1)])
 
     def _open(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Sort boxes, and return those that are neither sure nor led nor outside."""

@@ -26,7 +26,6 @@ from typing import Any
 import numpy as np
 from scipy.cluster.hierarchy import DisjointSet
 
-from polycorner import checks
 from polycorner.formulas.ranges import outward
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.enclosures import Formulas
@@ -48,12 +47,8 @@ Link = tuple[Fraction, Choice, Choice]
 class ConvexPieces:
     """The pieces of a polyhedron of affine functions in a box, and an energy that is affine.
 
-    Parameters
-    ----------
-    problem : Problem
-    rows : (m, n + 1) array of Fraction
-        Values at zero and derivatives of inequalities, equations, and the energy.
-    box : (n, 2) array of Fraction
+    ``rows`` ``(m, n + 1)`` are values at zero and derivatives of inequalities, equations, and the
+    energy; the box is ``(n, 2)``.
     """
 
     def __init__(self, problem: Problem, rows: Array, box: Array) -> None:
@@ -143,12 +138,8 @@ class _Join:
 class ConvexTree:
     """The tree in which components of ``{E <= c}`` are born and merge as ``c`` rises.
 
-    Attributes
-    ----------
-    minima : list of list of Choice
-        The pieces that have the set of each local minimum in common, the lowest first.
-    joins : list of _Join
-        Where components merge, the lowest first.
+    ``minima`` are the pieces that have the set of each local minimum in common, and ``joins`` are
+    where components merge; the lowest are first in both.
     """
 
     def __init__(
@@ -276,30 +267,11 @@ def convex_landscape(
     equally high, as many as it takes.  Routes are straight in each piece, and their vertices are
     the doubles next to rational ones.
 
-    Parameters
-    ----------
-    problem : Problem
-    box : sequence or mapping
-        As for :func:`.stationary_points`.  Its sides are walls.
-    cap : float, optional
-        The energy up to which the landscape is sought.
-    max_pieces, max_seconds : optional
-        Where the search ends at the latest, with what is known up to a lower cap.  It ends so at
-        Ctrl-C, too.
-    progress : Progress, optional
-        Called with the number of pieces that were examined, those with parts of the first unions
-        only among them, None, and what was found in words.
-
-    Returns
-    -------
-    Landscape or None
-        None where the manifold has other factors than lines, where a function or the energy is not
-        affine with rational coefficients (doubles are rational).
-
-    Raises
-    ------
-    TypeError, ValueError
-        For a box that is none.
+    It is None where the manifold has other factors than lines, where a function or the energy is
+    not affine with rational coefficients (doubles are rational).  The sides of the box are walls.
+    A search that ends early, as after ``max_pieces`` pieces or at Ctrl-C, leaves what is known up
+    to a lower cap.  Progress is called with the number of pieces that were examined, those with
+    parts of the first unions only among them, None, and what was found in words.
 
     Examples
     --------
@@ -317,9 +289,6 @@ def convex_landscape(
     ([[0.0, 0.0], [3.0, 0.0], [0.25, 0.25]], [(0.5, 0.5), (1.5, 1.5)])
     """
     manifold = problem.polyhedron.manifold
-    checks.real("cap", cap, infinite=True)
-    checks.whole("max_pieces", max_pieces, least=1)
-    checks.real("max_seconds", max_seconds, above=0, infinite=True)
     if manifold.factors or np.isfinite(manifold.periods).any():
         return None
     whole = domain(manifold, box)

@@ -54,13 +54,8 @@ class Way:
 class Junction:
     """Where components of a sublevel set join at a point.
 
-    Attributes
-    ----------
-    ways : tuple of Way
-        One for each component below the point nearby; fewer than two at no pass.
-    index : int
-        Negative curvatures along the face of the contacts with positive multipliers.
-    kind : {"saddle", "tip", "locus"}
+    It has a way for each component below the point nearby, fewer than two at no pass; the index
+    counts negative curvatures along the face of the contacts with positive multipliers.
     """
 
     ways: tuple[Way, ...]
@@ -248,16 +243,8 @@ def _tip(
 def sides_of(problem: Problem, certificate: Certificate) -> tuple[Array, ...]:
     """Return points a little below a pass, one on each side of it, in the polyhedron.
 
-    Parameters
-    ----------
-    problem : Problem
-    certificate : Certificate
-        Of the pass.
-
-    Returns
-    -------
-    tuple of (n,) arrays
-        Two or more; none where the point is no pass, or not seen to be one.
+    Two or more, ``(n,)`` each; none where the certificate's point is no pass, or not seen to be
+    one.
     """
     found = crossing_at(problem, certificate.point, certificate.tolerances)
     walks = Walks(problem, orbits_of(problem, None), certificate.tolerances)

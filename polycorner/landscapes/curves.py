@@ -26,20 +26,17 @@ less than ``r``.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, dot, matrix, precision, square
+from polycorner.intervals.balls import Ball, ball, balls, dot, matrix, middles, precision, square
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation.problem import Problem
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value, cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 BITS = 106
 MOST_HALVINGS = 6  # of a straight piece before it is given up
@@ -66,7 +63,7 @@ class Spot(Value):
     @cached_property
     def middle(self) -> Array:
         """A point near it, ``(n,)``."""
-        return np.array([float(x.mid()) for x in self.box])
+        return middles(self.box)
 
 
 class Curves:
@@ -194,7 +191,7 @@ class Curves:
         if isinstance(forms, Undecided):
             return None
         found = forms.evaluate(Box(hull), 2 if bent else 1)
-        gradients, d = found[1], [ball(x) for x in along.tolist()]
+        gradients, d = found[1], balls(along)
         columns = [[ball(x) for x in column] for column in frame.T.tolist()]
         k, speed = len(rows), d
         inverse = None
@@ -262,7 +259,7 @@ class Curves:
 
         if not rows:
             return Spot(tuple(base), held)
-        middle = [ball(x) for x in y.tolist()]
+        middle = balls(y)
         residual = self.formulas.values(Box(at(middle)), rows)
         reach = [
             ball(0, 4 * abs(r).upper() + ball(2) ** (8 - BITS) * ball(size))
@@ -373,7 +370,7 @@ class Curves:
         ]
         # The solutions at the ends, so near to the vertices that pieces join.
         for vertex in (a, b):
-            found = self.formulas.values(Box([ball(x) for x in vertex.tolist()]), rows)
+            found = self.formulas.values(Box(balls(vertex)), rows)
             sizes = [2 * abs(x).upper() for x in found]
             if not all(
                 dot(sizes, [abs(c[i]) for c in columns]) <= off

@@ -9,15 +9,14 @@ the margin.  A route ends with a straight piece to a point a little above a mini
 from the minimum reaches.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import TYPE_CHECKING
+from itertools import islice, pairwise
 
 import numpy as np
 from scipy.optimize import nnls
 
-from polycorner.intervals.balls import ball, precision
+from polycorner.intervals.balls import Ball, ball, precision
 from polycorner.landscapes.components import Component
 from polycorner.landscapes.curves import BITS, Curves, Spot, above, under
 from polycorner.landscapes.routes import Route
@@ -25,9 +24,6 @@ from polycorner.polyhedra.cones import least_distance
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 
 @dataclass(frozen=True)
@@ -62,9 +58,6 @@ class DescentOptions:
     stiff: float = 1e-6
 
 
-OPTIONS = DescentOptions()
-
-
 @dataclass(frozen=True, eq=False)
 class Target(Value):
     """A minimum, and points above it from which a way down to it is verified.
@@ -94,10 +87,8 @@ class Target(Value):
 class Descents:
     """Descents to some minima of a problem; ``free`` are the coordinates that may change."""
 
-    def __init__(
-        self, curves: Curves, free: Sequence[int], options: DescentOptions = OPTIONS
-    ) -> None:
-        self.curves, self.options = curves, options
+    def __init__(self, curves: Curves, free: Sequence[int]) -> None:
+        self.curves, self.options = curves, DescentOptions()
         self.problem = curves.problem
         self.free = np.zeros(self.problem.dimension, dtype=np.bool_)
         self.free[list(free)] = True
@@ -114,15 +105,18 @@ class Descents:
         lifted: list[Spot] = []
         if spot.zeros:
             into = self.into(spot.middle, spot.zeros)
-            length = self.options.first
-            while into is not None and length > self.options.least and len(lifted) < 4:
-                end = self._lift(spot, into, length)
-                if end is not None:
-                    lifted.append(end)
-                length /= 6
+            tried = (self._lift(spot, into, h) for h in self._lengths(6) if into is not None)
+            lifted = list(islice((end for end in tried if end is not None), 4))
         elif all(float(x.rad()) <= off for x, off in zip(spot.box, self.curves.off, strict=True)):
             lifted = [replace(spot, top=top)]
         return Target(spot, top, tuple(lifted), part)
+
+    def _lengths(self, ratio: float) -> Iterator[float]:
+        """Yield lengths that are tried, the longest first."""
+        length = self.options.first
+        while length > self.options.least:
+            yield length
+            length /= ratio
 
     def _lift(self, spot: Spot, into: Array, length: float) -> Spot | None:
         """Return the end of a curve into the set, off all walls, whatever the energy does."""
@@ -168,8 +162,7 @@ class Descents:
 
         Empty if none is verified.  ``along`` is a direction of negative curvature, scaled.
         """
-        length = self.options.first
-        while length > self.options.least:
+        for length in self._lengths(3):
             end = self.curves.curve(start, held, along * self.scales, length, bent=True)
             if end is not None:
                 if not (held or self.curves.equations):
@@ -179,7 +172,6 @@ class Descents:
                 off = self._off(end, held, ceiling)
                 if off is not None:
                     return [end, off]
-            length /= 3
         return []
 
     def _off(self, spot: Spot, zeros: frozenset[int], ceiling: "Ball") -> Spot | None:
@@ -209,12 +201,10 @@ class Descents:
 
     def fall(self, start: Spot, rising: frozenset[int], along: Array) -> list[Spot]:
         """Return a point on the way down from a tip, along a direction of descent, scaled."""
-        length = self.options.first
-        while length > self.options.least:
+        for length in self._lengths(3):
             end = self.curves.curve(start, frozenset(), along * self.scales, length, rising=rising)
             if end is not None:
                 return [end]
-            length /= 3
         return []
 
     def route(
@@ -222,13 +212,8 @@ class Descents:
     ) -> tuple[int, Route] | None:
         """Return the minimum that a descent ends in, by its number, and the way; None if none.
 
-        Parameters
-        ----------
-        begun : sequence of Spot
-            The first points, the last of them off all walls.
-        start : Spot
-            The pass, below which the route has to stay.
-        targets : sequence of Target
+        The first points of the way have begun at the pass ``start``, below which it has to stay,
+        and the last of them is off all walls.
         """
         with precision(BITS):
             height = self.curves.value(start.box)

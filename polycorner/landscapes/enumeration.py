@@ -12,6 +12,7 @@ from polycorner import checks
 from polycorner.formulas.periodicity import check_function
 from polycorner.interrupts import first_interrupt
 from polycorner.intervals.boxes import BoxFunctions
+from polycorner.kinds import checked
 from polycorner.landscapes.barriers import Landscape
 from polycorner.landscapes.convex import convex_landscape
 from polycorner.landscapes.curves import Curves
@@ -22,6 +23,7 @@ from polycorner.progress import Progress, silent
 from polycorner.proofs.lists.critical import critical_points, minima_on
 from polycorner.proofs.lists.domains import Domain, domain
 from polycorner.proofs.lists.enumeration import Limits
+from polycorner.proofs.lists.tree import bisected
 from polycorner.tolerances import SEARCH
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ MOST_BOXES = 20_000  # with which a side of a box is shown to miss the set
 BEYOND = 1 / 64  # of a side that is a wall, by which boxes reach beyond it
 
 
+@checked
 def landscape(
     polyhedron: Polyhedron,
     energy: "Energy",
@@ -96,8 +99,6 @@ def landscape(
     checks.real("cap", cap, above=-inf, infinite=True)
     posed = pose(polyhedron, energy)
     whole = domain(polyhedron.manifold, box)
-    if symmetry is not None:
-        checks.instance("symmetry", symmetry, Symmetry)
     checks.real("resolution", resolution, above=0)
     limits = Limits(max_boxes, max_seconds, workers, progress)
     limited = _limited(polyhedron, region)
@@ -225,9 +226,5 @@ def _misses(
         sides = (upper - lower) / units
         if len(lower) and (sides.max(axis=1) <= 0).any():
             return False  # a point that may be in the set
-        each, split = np.arange(len(lower)), sides.argmax(axis=1)
-        middle = 0.5 * (lower + upper)[each, split]
-        first, second = upper.copy(), lower.copy()
-        first[each, split] = second[each, split] = middle
-        lower, upper = np.concatenate([lower, second]), np.concatenate([first, upper])
+        lower, upper = bisected(lower, upper, sides.argmax(axis=1))
     return not len(lower)

@@ -59,12 +59,7 @@ class Bounds:
 class Heights:
     """Lower bounds of the energy on the points of a set in boxes.
 
-    Parameters
-    ----------
-    problem : Problem
-        The set and the energy.
-    exits : int
-        How many of the inequalities, the last ones, are those whose zeros are asked about.
+    ``exits`` is how many of the inequalities, the last ones, are those whose zeros are asked about.
     """
 
     def __init__(self, problem: Problem, exits: int = 0) -> None:

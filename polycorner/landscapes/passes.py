@@ -37,9 +37,9 @@ undecided, is taken to join everything, from the least energy it may have: bound
 all the same.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TypeAlias
 
 import numpy as np
 from scipy.optimize import linprog
@@ -57,11 +57,16 @@ from polycorner.polyhedra.polyhedron import Piece
 from polycorner.proofs import StationaryList, StationaryPoint
 from polycorner.proofs.kkt import KKTSystem, enclose, newton
 from polycorner.proofs.lists.critical import CriticalList, CriticalMember
+from polycorner.proofs.lists.images import Motion
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
-if TYPE_CHECKING:
-    from polycorner.proofs.lists.images import Motion
+# Whether a way bends down, what is held or rises along it, and its direction, scaled.
+Start: TypeAlias = tuple[bool, frozenset[int], Array]
+
+
+def _both(held: frozenset[int], way: Array | None) -> list[Start]:
+    return [] if way is None else [(True, held, way), (True, held, -way)]
 
 
 @dataclass
@@ -87,8 +92,13 @@ class PossiblePass:
     kind: Kind
     orbit: int
     energy: Bounds
-    starts: list[tuple[bool, frozenset[int], Array]] = field(default_factory=list)
+    starts: list[Start] = field(default_factory=list)
     sides: list[Side] = field(default_factory=list)
+
+    def told(self, sides: Iterable[Side]) -> Pass:
+        """Return the pass with its sides."""
+        about = self.spot.middle, self.energy, self.active, self.index, self.kind
+        return Pass(*about, tuple(sides), self.orbit)
 
 
 @dataclass
@@ -161,7 +171,9 @@ class Sorted:
 
     def energy(self, spot: Spot) -> Bounds:
         """Return bounds of the energy on a box."""
-        return bounds_of(self.curves, spot)
+        with precision(BITS):
+            value = self.curves.value(spot.box)
+            return (under(value), above(value)) if value.is_finite() else (-np.inf, np.inf)
 
     def _asked(self, lower: Array, upper: Array) -> bool:
         return self.energy(self.spot(lower, upper, frozenset()))[0] <= self.cap
@@ -194,23 +206,15 @@ class Sorted:
 
     def _signs(self, spot: Spot) -> list[int | None]:
         """Return the signs of all inequalities at a point, None for those that are not decided."""
-        low, high = self.functions.values(
-            *(np.array([[f(x) for x in spot.box]]) for f in (under, above))
-        )
+        ends = (np.array([[f(x) for x in spot.box]]) for f in (under, above))
+        low, high = self.functions.values(*ends)
         with precision(BITS):
-            values = self.curves.formulas.values(
-                Box(list(spot.box)), range(self.problem.inequalities)
-            )
-            return [
-                0
-                if i in spot.zeros
-                else 1
-                if v > 0 or low[0, i] > 0
-                else -1
-                if v < 0 or high[0, i] < 0
-                else None
-                for i, v in enumerate(values)
-            ]
+            rows = range(self.problem.inequalities)
+            values = self.curves.formulas.values(Box(list(spot.box)), rows)
+        return [
+            0 if i in spot.zeros else 1 if v > 0 or a > 0 else -1 if v < 0 or b < 0 else None
+            for i, (v, a, b) in enumerate(zip(values, low[0], high[0], strict=False))
+        ]
 
     def _regular(
         self, spot: Spot, one: CriticalMember, held: frozenset[int], pieces: Sequence[Piece]
@@ -223,7 +227,7 @@ class Sorted:
         if len(pieces) == 1:
             if p.index == 1:
                 way = self._downwards(spot, held)
-                starts = [] if way is None else [(True, held, way), (True, held, -way)]
+                starts = _both(held, way)
                 new = PossiblePass(*about, "saddle", p.orbit, self.energy(spot), starts)
                 self.candidates.append(new)
         elif p.index == 0:
@@ -298,8 +302,7 @@ class Sorted:
         domain = self.found.domain
         for number, place in enumerate(self.found.loci):
             z = list(place.z)
-            lower, upper = domain.lower.copy(), domain.upper.copy()
-            lower[z], upper[z] = place.sharp_lower, place.sharp_upper
+            lower, upper = place.sides(domain)
             if not self._asked(lower, upper):
                 continue
             if place.sample is None:
@@ -322,13 +325,8 @@ class Sorted:
                     self.nodes.append(ListedMinimum(new, target))
                 else:
                     way = self._unstable(spot, z)
-                    starts = [] if way is None else [
-                        (True, frozenset[int](), way), (True, frozenset[int](), -way)
-                    ]  # fmt: skip
-                    energy = self.energy(spot)
-                    self.candidates.append(
-                        PossiblePass(spot, (), 1, "locus", orbit, energy, starts)
-                    )
+                    about = self.energy(spot), _both(frozenset(), way)
+                    self.candidates.append(PossiblePass(spot, (), 1, "locus", orbit, *about))
 
     def _unstable(self, spot: Spot, z: Sequence[int]) -> Array | None:
         bends = self.problem.evaluate(spot.middle, 2)[2][-1]
@@ -390,19 +388,13 @@ class Sorted:
             if image is not None:
                 yield image
                 continue
-            sides = [
-                *one.sides,
-                *(
-                    Side(None) if stopped() else self._side(one, start, targets)
-                    for start in one.starts
-                ),
-            ]
+            found = (
+                Side(None) if stopped() else self._side(one, start, targets) for start in one.starts
+            )
+            sides = [*one.sides, *found]
             if one.kind == "exit" and not one.starts:
                 sides = []
-            new = Pass(
-                one.spot.middle, one.energy, one.active, one.index, one.kind, tuple(sides),
-                one.orbit,
-            )  # fmt: skip
+            new = one.told(sides)
             if one.orbit >= 0:
                 known.setdefault((one.orbit, one.kind), new)
             yield new
@@ -410,7 +402,7 @@ class Sorted:
     def _side(
         self,
         one: PossiblePass,
-        start: tuple[bool, frozenset[int], Array],
+        start: Start,
         targets: Sequence[Target],
     ) -> Side:
         bent, held, way = start
@@ -428,7 +420,7 @@ class Sorted:
             return Side(OUTSIDE - 1 - number + len(self.nodes), route)
         return Side(number, route)
 
-    def _permutation(self, g: "Motion") -> list[int | None]:
+    def _permutation(self, g: Motion) -> list[int | None]:
         """Return where a symmetry takes the nodes; None where that is not decided."""
         manifold = self.problem.polyhedron.manifold
         found: list[int | None] = []
@@ -452,7 +444,7 @@ class Sorted:
         self,
         first: Pass,
         one: PossiblePass,
-        motions: "Sequence[tuple[Motion, list[int | None]]]",
+        motions: Sequence[tuple[Motion, list[int | None]]],
     ) -> Pass | None:
         """Return a pass carried along by the symmetry that takes another one to it."""
         manifold = self.problem.polyhedron.manifold
@@ -470,17 +462,5 @@ class Sorted:
                         return None
                     path = np.array([g(q, manifold) for q in side.route.vertices])
                     sides.append(Side(there, replace(side.route, vertices=unwound(manifold, path))))
-                return Pass(
-                    one.spot.middle, one.energy, one.active, one.index, one.kind, tuple(sides),
-                    one.orbit,
-                )  # fmt: skip
+                return one.told(sides)
         return None
-
-
-def bounds_of(curves: Curves, spot: Spot) -> Bounds:
-    """Return bounds of the energy on a box, as doubles."""
-    with precision(BITS):
-        value = curves.value(spot.box)
-        if not value.is_finite():
-            return -np.inf, np.inf
-        return under(value), above(value)

@@ -73,12 +73,8 @@ class Dictionary:
 class ExactProgrammes:
     """Linear programmes on a box, in exact numbers.
 
-    Parameters
-    ----------
-    rows : (k, n + 1) array of Fraction
-        Values at zero and derivatives of the functions.
-    energy : (n + 1,) array of Fraction
-    box : (n, 2) array of Fraction
+    ``rows`` ``(k, n + 1)`` and ``energy`` ``(n + 1,)`` are values at zero and derivatives; the box
+    is ``(n, 2)``.
     """
 
     def __init__(self, rows: Array, energy: Array, box: Array) -> None:

@@ -7,7 +7,7 @@ multipliers and curvatures; with multipliers that are zero by the copositivity o
 complement; in a union by the pieces that meet, at minima on the intersections of two branches.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import inf
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from polycorner import checks
+from polycorner.kinds import checked
 from polycorner.landscapes.barriers import Landscape, Minimum, Pass, Side
 from polycorner.landscapes.crossings import Junction, crossing_at, orbits_of, sides_of, starts_of
 from polycorner.landscapes.routes import Route
@@ -30,7 +31,6 @@ from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import distances, local_pieces
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
-from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, RANK_TOLERANCE, TOLERANCE, Tolerances
 
@@ -60,31 +60,16 @@ def search_passes(  # noqa: PLR0913 - all but two are options
 ) -> tuple[Certificate, ...]:
     """Search for passes by walks uphill from given minima.
 
-    Parameters
-    ----------
-    problem : Problem
-    minima : sequence of Certificate
-        From which, and between which, walks start.
-    starts : int
-        How many walks are done.
-    rng : Generator
-        Source of directions.
-    tolerances : Tolerances, optional
-    symmetry : Symmetry, optional
-        Up to which passes are listed once.
-    cap : float, optional
-        The highest energy.
-    points : sequence of (n,) arrays, optional
-        Points from which other walks start.
-    progress : callable, optional
-        Called with walks done, their number, and the number of stationary points in words.
+    ``starts`` walks are done from the minima and between them, and others from ``points``.
+    Progress is called with walks done, their number, and the number of stationary points in words.
 
     Returns
     -------
     tuple of Certificate
-        The lowest first: saddles of index 1 with positive multipliers; in a union, minima on two
-        branches at once; with multipliers that are zero, what the second order makes a pass.
-        After an interruption (Ctrl-C), those that were found so far.
+        The lowest first, up to the symmetry and the energy ``cap``: saddles of index 1 with
+        positive multipliers; in a union, minima on two branches at once; with multipliers that are
+        zero, what the second order makes a pass.  After an interruption (Ctrl-C), those that were
+        found so far.
     """
     quotient = Paths(problem.polyhedron, symmetry or Symmetry(), tolerances, problem=problem)
     walks, loci = Walks(problem, orbits_of(problem, symmetry), tolerances), Loci(quotient)
@@ -322,16 +307,12 @@ class Lows:
             yield Pass(
                 point=point,
                 energy=(found.energy, found.energy),
-                active=tuple(self._names(found.stratum.active, group[k].names)),
+                active=tuple(group[k].names.get(name, name) for name in found.stratum.active),
                 index=crossing.index,
                 kind=crossing.kind,
                 sides=tuple(self._side(end, path, nodes) for end, path in carried),
                 orbit=orbit,
             )
-
-    @staticmethod
-    def _names(active: Iterable[str], renaming: Mapping[str, str]) -> list[str]:
-        return [renaming.get(name, name) for name in active]
 
     def _side(self, end: Locus | None, path: Array, nodes: Sequence[FoundMinimum]) -> Side:
         """Return a side with its minimum, and its route if that leads to the minimum listed."""
@@ -357,7 +338,7 @@ def _minimum(node: FoundMinimum) -> Minimum:
     return Minimum(node.point, (found.energy, found.energy), found.active, kind, node.orbit)
 
 
-@shown
+@checked
 def search_landscape(  # noqa: PLR0913 - all but two are options
     polyhedron: Polyhedron,
     energy: "Energy",
@@ -417,11 +398,7 @@ def search_landscape(  # noqa: PLR0913 - all but two are options
     """
     tolerances = Tolerances.of(tolerance, rank_tolerance)
     problem = pose(polyhedron, energy)
-    if symmetry is not None:
-        checks.instance("symmetry", symmetry, Symmetry)
     checks.real("cap", cap, infinite=True)
-    if not callable(progress):
-        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
     problem.check_size()
     if problem.is_sparse:
         checks.refuse("polyhedron", "one of few coordinates", problem.dimension)

@@ -73,14 +73,7 @@ class QuadraticModel:
 
 @dataclass(frozen=True, eq=False)
 class Walks:
-    """What walks need to know of a problem.
-
-    Attributes
-    ----------
-    problem : Problem
-    orbits : callable
-    tolerances : Tolerances
-    """
+    """What walks need to know of a problem."""
 
     problem: Problem
     orbits: Orbits

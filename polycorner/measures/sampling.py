@@ -87,13 +87,7 @@ STEPS = SampleOptions()
 class ChainState(Checked):
     """Where a chain is.
 
-    Attributes
-    ----------
-    point : (n,) array
-    held : (m,) array of int
-        1 for contacts that are held.
-    stream : int
-        The state of its random numbers.
+    ``held`` is 1 for contacts that are held, ``stream`` the state of its random numbers.
     """
 
     point: Array

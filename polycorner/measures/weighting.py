@@ -88,16 +88,8 @@ def densities(
 ) -> Array:
     """Return the density with respect to surface measure across orbits, ``(k,)``.
 
-    Without stickiness; infinite where gradients are dependent.
-
-    Parameters
-    ----------
-    weighting : Weighting
-    quotient : Quotient
-        The polyhedron modulo its symmetry.
-    rows : sequence of int
-        The contacts that are held.
-    points : (k, n) array
+    Without stickiness; infinite where gradients are dependent.  ``rows`` are the contacts that are
+    held at the points ``(k, n)``.
     """
     orbits = np.array([quotient.orbit(q) for q in points])
     density = _volumes(orbits)

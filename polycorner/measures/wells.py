@@ -37,18 +37,9 @@ def confined(
 
     NaN where it has more than two flexes, or is not rigid to second order.
 
-    Parameters
-    ----------
-    quotient : Quotient
-        The polyhedron modulo its symmetry.
-    rows : list of int
-        The contacts of the corner.
-    q : (n,) array
-        The corner.
-    stiffness : float
-        Over temperature, in inverse squared units of the contacts' functions.
-    tolerance : float
-        Relative error of the integral over the directions of two flexes.
+    ``rows`` are the contacts of the corner ``q``.  The stiffness is one over temperature, in
+    inverse squared units of the contacts' functions; the tolerance is the relative error of the
+    integral over the directions of two flexes.
     """
     at, (_, slopes, bends) = quotient.at(q), quotient.bent(q)
     fixed, limit = list(quotient.equations), quotient.tolerances.rank

@@ -3,11 +3,10 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations, islice
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.intervals.balls import GUARD_BITS, ball, bits_for, precision
+from polycorner.intervals.balls import GUARD_BITS, Ball, ball, bits_for, middles, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Certificate, Entrapment
@@ -29,11 +28,8 @@ from polycorner.proofs.invariance import (
     translations,
 )
 from polycorner.proofs.kkt import FIRST_BITS, SUBJECT, Enclosure, KKTSystem, enclose, newton
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-    from polycorner.spaces.manifold import Array
 
 MOST_SUBSETS = 1000  # of one size that are examined
 MOST_FACES = 8  # on which a proof is tried
@@ -46,17 +42,7 @@ FAR = f"{SUBJECT} near the point"
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """A claim, approximate unknowns, and the result for declared fields that are no symmetries.
-
-    Attributes
-    ----------
-    claim : Claim
-        What is to be proved.
-    start : list of Ball
-        Approximate unknowns of its system.
-    refused : ConditionResult or None
-        The result for a declared field that is not a symmetry, if there is one.
-    """
+    """A claim, approximate unknowns, and the result for declared fields that are no symmetries."""
 
     claim: Claim
     start: "list[Ball]"
@@ -110,7 +96,7 @@ def _subsets(rows: Sequence[int], most: int) -> Iterator[tuple[int, ...]]:
         yield from islice(combinations(rows, size), MOST_SUBSETS)
 
 
-def _carries(rows: Rows, size: int, slope: "Array", small: float) -> bool:
+def _carries(rows: Rows, size: int, slope: Array, small: float) -> bool:
     """Whether the energy's gradient is a combination of rows, the first ``size`` of them > 0."""
     weights = rows.weights(slope) if len(rows.units) else np.empty(0)
     rest = slope - weights @ rows.units
@@ -183,7 +169,7 @@ def _invariant(
 
 
 def _independent(
-    fields: Sequence[Generator], box: Box, scales: "Array", rank_tolerance: float
+    fields: Sequence[Generator], box: Box, scales: Array, rank_tolerance: float
 ) -> tuple[tuple[Generator, ...], tuple[tuple[float, ...], ...]]:
     """Return fields with independent vectors at the point, and a normal for each.
 
@@ -196,7 +182,7 @@ def _independent(
         values = field.at(box.hull)
         if isinstance(values, Undecided):
             continue
-        vector = np.array([float(x.mid()) for x in values]) / scales
+        vector = middles(values) / scales
         size = float(np.linalg.norm(vector))
         if not 0 < size < np.inf:
             continue
@@ -371,7 +357,7 @@ def _distance(certificate: Certificate, z: "list[Ball]") -> float:
     return max(abs(float(x) - float(q)) / float(s) for x, q, s in pairs)
 
 
-def _sharp(enclosure: Enclosure, digits: int, *, least: float = 1e-10) -> bool:
+def _sharp(enclosure: Enclosure, digits: int) -> bool:
     """Whether every unknown is enclosed to ``digits`` digits, relative to itself.
 
     Where it is smaller than ``least`` units, they are relative to its unit.
@@ -379,7 +365,7 @@ def _sharp(enclosure: Enclosure, digits: int, *, least: float = 1e-10) -> bool:
     units = enclosure.predictor.system.units
     small = ball(10) ** -digits
     return all(
-        x.rad() <= small * (x.abs_lower() + least * unit)
+        x.rad() <= small * (x.abs_lower() + 1e-10 * unit)
         for x, unit in zip(enclosure.solution, units, strict=True)
     )
 

@@ -39,11 +39,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     column,
     decimals,
@@ -53,6 +53,7 @@ from polycorner.intervals.balls import (
     identity,
     matrix,
     middle_inverse,
+    middles,
     square,
 )
 from polycorner.intervals.enclosures import Formulas, Undecided
@@ -61,11 +62,8 @@ from polycorner.proofs.exact import implied
 from polycorner.proofs.growth import Examination, Growth, largest, row_sums, upper_bound
 from polycorner.proofs.invariance import annihilated
 from polycorner.proofs.rattlers import reads
-from polycorner.proofs.witnesses import UnshownError, Witness
+from polycorner.proofs.witnesses import UnshownError, Witness, decided, need
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 SUBJECT = "a minimum between two energies"
 
@@ -141,14 +139,7 @@ def number_of(x: Fraction) -> str:
 def examine(problem: Problem, formulas: Formulas, witness: Witness) -> "BoundedMinimum | Undecided":
     """Return the minimum that a witness shows, or the hypothesis that is not shown.
 
-    Parameters
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    formulas : Formulas
-        Its inequalities, equations and energy, in this order.
-    witness : Witness
-        Points, weights and boxes; see the module.
+    ``formulas`` are those of the inequalities, the equations and the energy, in this order.
     """
     try:
         return _examined(Examination(problem, formulas, witness))
@@ -168,18 +159,14 @@ def _examined(about: Examination) -> BoundedMinimum:
         abs(inner.hull[j] - ball(w.centre[j])) < ball(w.room.get(j, Fraction(0))) * about.scales[j]
         for j in about.rattling
     )
-    if not (strict or (away < ball(w.reach) and free)):
-        msg = "the inner point is not shown to lie inside the box"
-        raise UnshownError(msg)
-    if not (strict or about.lies_in(inner)):
-        msg = "the inner point is not shown to lie in the set"
-        raise UnshownError(msg)
+    near = strict or (away < ball(w.reach) and free)
+    need(near, "the inner point is not shown to lie inside the box")
+    need(strict or about.lies_in(inner), "the inner point is not shown to lie in the set")
     (above,) = about.formulas.values(inner, [about.energy_row])
     gap = ball(0) if strict else upper_bound((above - energy + growth.delta).max(ball(0)))
     radius = ball(0) if strict else upper_bound(growth.radius(gap))
-    if not radius < ball(w.reach):
-        msg = f"the minimum is not shown to be closer than the sides of the box, {radius.str(3)}"
-        raise UnshownError(msg)
+    far = f"the minimum is not shown to be closer than the sides of the box, {radius.str(3)}"
+    need(radius < ball(w.reach), far)
     _check_room(about, radius)
     alone = _alone(about, growth, gap, ball(0) if strict else upper_bound(away))
     below = energy if strict else energy - growth.slack
@@ -197,17 +184,13 @@ def _examined(about: Examination) -> BoundedMinimum:
 def _check_box(about: Examination) -> None:
     """Check the hypotheses on functions and symmetries over the whole box."""
     w, problem = about.witness, about.problem
-    for j, period in enumerate(problem.polyhedron.manifold.periods):
-        if not ball(2 * w.reach) * about.scales[j] < ball(period / 2 if period < inf else 1e300):
-            msg = "the box is half a period wide"
-            raise UnshownError(msg)
-    if not about.pieces:
-        msg = "the set does not meet the box"
-        raise UnshownError(msg)
+    for scale, period in zip(about.scales, problem.polyhedron.manifold.periods, strict=True):
+        half = ball(period / 2 if period < inf else 1e300)
+        need(ball(2 * w.reach) * scale < half, "the box is half a period wide")
+    need(about.pieces, "the set does not meet the box")
     every = frozenset.intersection(*about.pieces)
-    if not set(w.supports) <= every:
-        msg = "functions that support are not asked for by every branch, or positive on the box"
-        raise UnshownError(msg)
+    asked = set(w.supports) <= every
+    need(asked, "functions that support are not asked for by every branch, or positive on the box")
     m = problem.inequalities
     for row in range(m, m + len(problem.polyhedron.equations)):
         if row not in w.equations and not implied(about.formulas, w.equations, row):
@@ -219,16 +202,12 @@ def _check_box(about: Examination) -> None:
             if not all(annihilated(about.forms, gauge.field)):
                 msg = f"exact algebra does not show that nothing changes along {gauge.field}"
                 raise UnshownError(msg)
-            along = gauge.field.at(about.whole.hull)
-            if isinstance(along, Undecided):
-                raise UnshownError(str(along))
-            vectors.append(along)
+            vectors.append(decided(gauge.field.at(about.whole.hull)))
         normals = [[ball(x) for x in gauge.normal] for gauge in w.gauges]
         table = matrix([[dot(normal, v) for v in vectors] for normal in normals])
         inverse = middle_inverse(table.tolist())
-        if inverse is None or not row_sums(identity(len(vectors)) - inverse * table) < 1:
-            msg = "symmetries are not shown to cross the section"
-            raise UnshownError(msg)
+        crosses = inverse is not None and row_sums(identity(len(vectors)) - inverse * table) < 1
+        need(crosses, "symmetries are not shown to cross the section")
 
 
 def _check_room(about: Examination, radius: "Ball") -> None:
@@ -241,9 +220,7 @@ def _check_room(about: Examination, radius: "Ball") -> None:
     ]  # fmt: skip
     values = about.formulas.values(about.box(radius), others)
     for i, value in zip(others, values, strict=True):
-        if not value > 0:
-            msg = f"{about.formulas.names[i]} is not shown to leave room to what rattles"
-            raise UnshownError(msg)
+        need(value > 0, f"{about.formulas.names[i]} is not shown to leave room to what rattles")
 
 
 def _alone(
@@ -266,7 +243,7 @@ def _alone(
     pulls = [ball(0)] * k
     if k:
         equations = matrix(gradients[supports : supports + k])
-        middle = np.array([[float(x.mid()) for x in row] for row in equations.tolist()])
+        middle = middles(equations.tolist())
         y = matrix(np.linalg.pinv(middle).tolist())
         try:
             back = (equations * y).inv()

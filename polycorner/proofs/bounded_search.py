@@ -7,12 +7,12 @@ Everything here is in doubles, or at the midpoints of balls; what it finds is pr
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, bits_for, exact, precision
+from polycorner.intervals.balls import Ball, ball, balls, bits_for, exact, middles, precision
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
@@ -22,11 +22,8 @@ from polycorner.proofs.growth import Examination
 from polycorner.proofs.invariance import Generator, generators, translations
 from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.proofs.witnesses import Gauge, UnshownError, Witness
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import Tolerances
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-    from polycorner.spaces.manifold import Array
 
 UNIT = 1e-3  # share of the energy's slope up to which the support of multipliers is counted
 BITS = 128
@@ -38,25 +35,15 @@ SIMPLE = 10_000  # largest denominator of a coordinate that is taken to be ratio
 class WitnessSearch:
     """The witnesses near one point.
 
-    Parameters
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    formulas : Formulas
-        Its inequalities, equations and energy.
-    point : (n,) array
-        The point near which a minimum is sought.
-    fields : sequence of Generator
-        Symmetries modulo which it is one.
-    tolerances : Tolerances
-        Up to which distance functions are contacts.
+    Functions are contacts up to a distance of the tolerances; the fields are symmetries modulo
+    which there is a minimum.
     """
 
     def __init__(
         self,
         problem: Problem,
         formulas: Formulas,
-        point: "Array",
+        point: Array,
         fields: Sequence[Generator],
         tolerances: Tolerances,
     ) -> None:
@@ -75,7 +62,7 @@ class WitnessSearch:
 
     # -------------------------------------------------------------------------------- multipliers
 
-    def multipliers(self, contacts: Sequence[int], q: "Array") -> "tuple[list[int], Array] | None":
+    def multipliers(self, contacts: Sequence[int], q: Array) -> tuple[list[int], Array] | None:
         """Return the rows of ``S`` and weights of ``S`` and the equations; None without any.
 
         The support is the fullest; on it the least weight, relative to its gradient, is largest.
@@ -121,7 +108,7 @@ class WitnessSearch:
     def polished(
         self,
         supports: Sequence[int],
-        weights: "Array",
+        weights: Array,
         gauges: Sequence[Gauge],
         start: "list[Ball]",
         bits: int,
@@ -133,7 +120,7 @@ class WitnessSearch:
         rows = (*supports, *self.equations, len(self.formulas.names) - 1)
         k, n = len(rows) - 1, self.problem.dimension
         q, lam = list(start), [ball(float(x)) for x in weights]
-        scales = [ball(s) for s in self.scales.tolist()]
+        scales = balls(self.scales)
         normals = [[ball(x) * s for x, s in zip(g.normal, scales, strict=True)] for g in gauges]
         anchor = list(start)
         last, stalled = np.inf, 0
@@ -143,7 +130,7 @@ class WitnessSearch:
             if isinstance(forms, Undecided):
                 return None
             values, gradients = forms.evaluate(box, 1)
-            floats = np.array([float(x.mid()) for x in q])
+            floats = middles(q)
             _, _, curved = self.problem.evaluate(floats, 2)
             scaled = [[g * s for g, s in zip(row, scales, strict=True)] for row in gradients]
             slope = [
@@ -163,7 +150,7 @@ class WitnessSearch:
                 (float(x.mid()) * curved[r] for r, x in zip(rows, lam, strict=False)),
                 np.zeros((n, n)),
             )
-            across = np.array([[float(x.mid()) for x in row] for row in scaled[:k]])
+            across = middles(scaled[:k])
             across = across.reshape(k, n)
             fixed = np.array([[float(x) for x in row] for row in normals]).reshape(-1, n)
             table = np.block(
@@ -198,7 +185,7 @@ class WitnessSearch:
         size = max((abs(x.mid()) for x in values), key=float, default=ball(0))
         if not size > ball(2) ** (-bits // 2):
             return list(contacts)
-        _, gradients = self.problem.evaluate(np.array([float(x.mid()) for x in q]), 1)
+        _, gradients = self.problem.evaluate(middles(q), 1)
         rows, right = gradients[list(contacts)], [float((x.mid() / size).mid()) for x in values]
         fixed = gradients[list(self.equations)]
         found = linprog(
@@ -209,10 +196,6 @@ class WitnessSearch:
             return []
         gaps = rows @ found.x + right
         return [i for i, gap in zip(contacts, gaps.tolist(), strict=True) if gap < 1e-6]
-
-    def reads(self, row: int) -> frozenset[int]:
-        """Return the coordinates that a function depends on."""
-        return reads(self.formulas, row)
 
     # ------------------------------------------------------------------------------- the witness
 
@@ -228,7 +211,7 @@ class WitnessSearch:
             return Undecided(SUBJECT, "no multipliers carry the energy's slope")
         supports, weights = found
         gauges = self._gauges(supports)
-        q = [ball(x) for x in self.point.tolist()]
+        q = balls(self.point)
         for _ in range(3):
             polished = self.polished(supports, weights, gauges, q, bits)
             if polished is None:
@@ -237,7 +220,7 @@ class WitnessSearch:
             kept = self.closing(supports, q, bits)
             if set(kept) == set(supports):
                 break
-            found = self.multipliers(kept, np.array([float(x.mid()) for x in q]))
+            found = self.multipliers(kept, middles(q))
             if found is None:
                 return Undecided(SUBJECT, "no multipliers carry the energy's slope")
             supports, weights = found
@@ -262,10 +245,10 @@ class WitnessSearch:
         """Return a section for each field, along one coordinate of the core."""
         energy = len(self.formulas.names) - 1
         held = (*supports, *self.equations, energy)
-        read = frozenset().union(*(self.reads(i) for i in held))
+        read = frozenset().union(*(reads(self.formulas, i) for i in held))
         found: list[Gauge] = []
         taken: list[int] = []
-        box = Box([ball(x) for x in self.point.tolist()])
+        box = Box(balls(self.point))
         rows: list[Any] = []
         smooth: list[Generator] = []
         fields = [*self.fields, *self._translations((*supports, *self.equations, energy), box)]
@@ -395,7 +378,7 @@ class WitnessSearch:
 def bounded_minimum(
     problem: Problem,
     formulas: Formulas,
-    point: "Array",
+    point: Array,
     fields: Sequence[Generator],
     tolerances: Tolerances,
     digits: int,

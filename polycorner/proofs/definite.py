@@ -2,15 +2,12 @@
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, matrix
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball, Matrix
-    from polycorner.spaces.manifold import Array
+from polycorner.intervals.balls import Ball, Matrix, ball, matrix, middles
+from polycorner.spaces.manifold import Array
 
 SHARPNESS = (3.0, 30.0, 300.0)  # with which least eigenvalues are smoothed, relative to the form
 
@@ -43,14 +40,14 @@ def positive_on_cone(curvature: Rows, rows: Rows, slopes: Rows, scales: Sequence
     if is_definite(_turned(form)):
         return True
     across = matrix([_scaled(row, scales, 1.0) for row in slopes]) * matrix(basis).transpose()
-    weights = _weights(_middle(form), _middle(across))
+    weights = _weights(middles(form.tolist()), middles(across.tolist()))
     if weights is None:
         return False
     shifted = form - across.transpose() * matrix(weights.tolist()) * across
     return is_definite(_turned(shifted))
 
 
-def _weights(form: "Array", slopes: "Array") -> "Array | None":
+def _weights(form: Array, slopes: Array) -> Array | None:
     """Return ``N`` for which the least eigenvalue of ``H - G^T N G`` is large, in doubles.
 
     The least eigenvalue is smoothed, more sharply in each round.
@@ -68,7 +65,7 @@ def _weights(form: "Array", slopes: "Array") -> "Array | None":
         [np.outer(units[i], units[j]) + np.outer(units[j], units[i]) for i, j in pairs]
     )
 
-    def smoothed(nu: "Array", sharpness: float) -> "tuple[float, Array]":
+    def smoothed(nu: Array, sharpness: float) -> tuple[float, Array]:
         values, vectors = np.linalg.eigh(form / size - np.tensordot(nu, bends, 1))
         shares = np.exp(-sharpness * (values - values[0]))
         slope = np.einsum("ai,kab,bi,i->k", vectors, bends, vectors, shares / shares.sum())
@@ -89,12 +86,8 @@ def _restricted(curvature: Rows, basis: Rows, scales: Sequence[float]) -> "Matri
     return across * hessian * across.transpose()
 
 
-def _middle(form: "Matrix") -> "Array":
-    return np.array([[float(x.mid()) for x in row] for row in form.tolist()])
-
-
 def _turned(form: "Matrix") -> "list[list[Ball]]":
-    middle = _middle(form)
+    middle = middles(form.tolist())
     if np.isfinite(middle).all():
         turn = matrix(np.linalg.eigh((middle + middle.T) / 2)[1].tolist())
         form = turn.transpose() * form * turn

@@ -18,19 +18,16 @@ Values are polynomials in symbols (:mod:`~polycorner.proofs.symbols`).
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, exact, integer_relation
+from polycorner.intervals.balls import Ball, ball, exact, integer_relation
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.kkt import Enclosure, KKTSystem
 from polycorner.proofs.polynomials import Polynomial
 from polycorner.proofs.symbols import Symbols, constants, evaluate, opened
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 MOST_POWERS = 4  # degree of a polynomial of which a coordinate may be a root
 MOST_CONSTANTS = 6  # irrational constants among which a number is sought
@@ -45,14 +42,8 @@ MOST_SYMBOLS, MOST_DEGREE, MOST_SUMMANDS = 6, 6, 40
 class ExactPoint:
     """An enclosed solution whose unknowns are known exactly, or as zeros of known polynomials.
 
-    Attributes
-    ----------
-    unknowns : tuple of Polynomial
-        Coordinates and multipliers, in symbols.
-    symbols : Symbols
-        Constants, and coordinates that are no combinations of them.
-    zeros : tuple of Polynomial
-        Polynomials in symbols that vanish.
+    ``unknowns`` are coordinates and multipliers, in symbols: constants, and coordinates that are no
+    combinations of them; ``zeros`` are polynomials in symbols that vanish.
     """
 
     unknowns: tuple[Polynomial, ...]

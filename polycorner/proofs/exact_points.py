@@ -77,11 +77,13 @@ def exact_point(
     >>> exact_point(D, ["0.6", "0.8"]).inside, exact_point(D, [0.6, 0.8]).inside
     (True, False)
     """
+    import sympy
+
     checks.instance("polyhedron", polyhedron, Polyhedron)
     given = _coordinates(polyhedron.manifold, point)
     reach = Fraction(checks.real("within", within, above=0))
     digits = checks.whole("digits", digits, least=1, most=MOST_DIGITS)
-    problem = pose(polyhedron, _nothing() if energy is None else energy)
+    problem = pose(polyhedron, sympy.Integer(0) if energy is None else energy)
     place = Signs(problem, bits_for(digits))
     return _judged(Repair(place, given, reach, digits, costly=energy is not None), digits)
 
@@ -151,9 +153,3 @@ def _exactly(name: str, x: object) -> Fraction:
     except (ValueError, ArithmeticError):
         pass
     return checks.refuse(f"point: {name}", expected, x)
-
-
-def _nothing() -> Any:
-    import sympy
-
-    return sympy.Integer(0)

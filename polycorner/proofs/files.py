@@ -132,13 +132,8 @@ def period(value: float) -> str | None:
 class ProvedFace(Value):
     """A point that solves the KKT equations of a face, and the symmetries modulo which it is one.
 
-    Attributes
-    ----------
-    held : tuple of int
-        Rows of the active functions and the equations.
-    centre : tuple of Fraction
-        Near the point, or the point itself; empty for a box of parameters.
-    gauges : tuple of Gauge
+    ``held`` are rows of the active functions and the equations; ``centre`` is near the point, or
+    the point itself, and empty for a box of parameters.
     """
 
     held: tuple[int, ...]

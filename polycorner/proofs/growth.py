@@ -40,21 +40,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from polycorner.intervals.balls import (
+    Ball,
+    Matrix,
     ball,
+    balls,
     column,
     dot,
     entries,
     identity,
     matrix,
     middle_inverse,
+    middles,
     square,
 )
-from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
+from polycorner.intervals.enclosures import Formulas, SmoothForms
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
 from polycorner.polyhedra.polyhedron import Piece
@@ -63,12 +67,8 @@ from polycorner.proofs.definite import pivots
 from polycorner.proofs.kkt import krawczyk, strictly_inside
 from polycorner.proofs.rattlers import reads
 from polycorner.proofs.symbols import Symbols, evaluate
-from polycorner.proofs.witnesses import UnshownError, Witness
+from polycorner.proofs.witnesses import UnshownError, Witness, decided, need
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball, Matrix
-    from polycorner.spaces.manifold import Array
 
 MOST_STEPS, MOST_WIDENED = 200, 6  # of Newton's method, and of the box of Krawczyk's test
 LEAST_BITS = 2000  # of the half side of this box
@@ -129,7 +129,7 @@ class Examination:
     @cached_property
     def scales(self) -> "list[Ball]":
         """The scales."""
-        return [ball(s) for s in self.problem.scales.tolist()]
+        return balls(self.problem.scales)
 
     def box(self, radius: "Fraction | Ball") -> Box:
         """Return the points whose core is near the centre, in the room of the rest."""
@@ -176,10 +176,7 @@ class Examination:
     @cached_property
     def forms(self) -> SmoothForms:
         """These functions, smooth on ``N``."""
-        found = self.formulas.smooth(self.whole, self.rows)
-        if isinstance(found, Undecided):
-            raise UnshownError(str(found))
-        return found
+        return decided(self.formulas.smooth(self.whole, self.rows))
 
     @cached_property
     def gradients(self) -> "list[list[Ball]]":
@@ -235,21 +232,17 @@ class Examination:
         values, around = self.central
         rows = [*gradients[: self.held], *self.normals]
         supports, size = len(self.witness.supports), len(self.core)
-        if not supports or len(rows) < size:
-            msg = "the gradients of the functions that support do not span"
-            raise UnshownError(msg)
-        middle = np.array(
-            [[float(x.mid()) for x in row] for row in (*around[: self.held], *self.normals)]
-        )
-        if not np.isfinite(middle).all():
-            msg = "gradients are not finite"
-            raise UnshownError(msg)
+        spans = supports and len(rows) >= size
+        need(spans, "the gradients of the functions that support do not span")
+        middle = middles((*around[: self.held], *self.normals))
+        need(np.isfinite(middle).all(), "gradients are not finite")
         p = matrix(np.linalg.pinv(middle.T).tolist())
         across = matrix(rows).transpose()
         defect = row_sums(identity(size) - across * p)
-        if not defect < 1:
-            msg = "the gradients of the functions that support are not shown to span on the box"
-            raise UnshownError(msg)
+        need(
+            defect < 1,
+            "the gradients of the functions that support are not shown to span on the box",
+        )
         t = defect / (1 - defect)
         slope = gradients[-1]
         rest = entries(column(slope) - across * column(self.weights))
@@ -257,9 +250,9 @@ class Examination:
         wide = [x + ball(0, 1) * spread for x in rest]
         shares = entries(p * column(wide))
         m = [lam + x for lam, x in zip(self.weights, shares, strict=True)]
-        if not all(x > 0 for x in m[:supports]):
-            msg = "multipliers are not shown to be positive on the box"
-            raise UnshownError(msg)
+        need(
+            all(x > 0 for x in m[:supports]), "multipliers are not shown to be positive on the box"
+        )
         sizes = [[abs(x) for x in row] for row in p.tolist()]
         spreads = [largest(row) + t * sum(row, ball(0)) for row in sizes]
         kappa = _least([x.lower() / s for x, s in zip(m[:supports], spreads, strict=False)])
@@ -278,26 +271,24 @@ class Examination:
         w, size = self.witness, len(self.core)
         supports = len(w.supports)
         lam = self.weights[: self.held]
-        if not all(x > 0 for x in lam[:supports]):
-            msg = "multipliers are not positive"
-            raise UnshownError(msg)
+        need(all(x > 0 for x in lam[:supports]), "multipliers are not positive")
         form = matrix(hessians[-1])
         for x, hessian in zip(lam, hessians, strict=False):
             form = form - matrix(hessian) * x
         top = self.formulas.values(self.whole, w.supports)
         stiff = [x / f.upper() for x, f in zip(lam, top, strict=False)]
-        if not all(x > 0 and x.is_finite() for x in stiff):
-            msg = "functions that support are not bounded on the box"
-            raise UnshownError(msg)
-        middle = np.array([[float(x.mid()) for x in row] for row in form.tolist()])
-        if not np.isfinite(middle).all():
-            msg = "second derivatives are not finite"
-            raise UnshownError(msg)
+        need(
+            all(x > 0 and x.is_finite() for x in stiff),
+            "functions that support are not bounded on the box",
+        )
+        middle = middles(form.tolist())
+        need(np.isfinite(middle).all(), "second derivatives are not finite")
         # Equations hold exactly, so that any weight of theirs is right: one as large as the form.
         heavy = 1e6 * (abs(middle).max() or 1.0)
         stiff += [ball(heavy)] * len(w.equations) + [ball(heavy)] * len(w.gauges)
         rows = [*gradients[: self.held], *self.normals]
-        bent = _middle_form(middle, rows, stiff)
+        normals = zip(stiff, map(middles, rows), strict=True)
+        bent = sum((float(x.mid()) * np.outer(g, g) for x, g in normals), middle)
         turn = matrix(np.linalg.eigh((bent + bent.T) / 2)[1].tolist())
         # Turned first: errors of w g g^T would couple directions of very different stiffness.
         form = turn.transpose() * form * turn
@@ -388,9 +379,7 @@ class _Zeros:
         about, w = self.about, self.about.witness
         values, rows = list[Any](), list[Any]()
         if w.equations:
-            forms = about.formulas.smooth(Box(hull), w.equations)
-            if isinstance(forms, Undecided):
-                raise UnshownError(str(forms))
+            forms = decided(about.formulas.smooth(Box(hull), w.equations))
             values, rows = map(list, forms.evaluate(Box(hull), 1))
         for gauge in w.gauges:
             normal = [ball(x) for x in gauge.normal]
@@ -466,17 +455,9 @@ def row_sums(rows: "Matrix") -> "Ball":
     return largest([sum((abs(x) for x in row), ball(0)) for row in rows.tolist()])
 
 
-def _middle_form(form: "Array", rows: "list[list[Ball]]", stiff: "list[Ball]") -> "Array":
-    found = form.copy()
-    for x, row in zip(stiff, rows, strict=True):
-        middle = np.array([float(y.mid()) for y in row])
-        found += float(x.mid()) * np.outer(middle, middle)
-    return found
-
-
 def _pivots(rows: "list[list[Ball]]") -> list[int]:
     """Return as many coordinates as rows, in which these are independent."""
-    left = np.array([[float(x.mid()) for x in row] for row in rows])
+    left = middles(rows)
     found: list[int] = []
     for k in range(len(left)):
         sizes = abs(left[k:])

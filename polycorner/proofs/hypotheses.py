@@ -1,12 +1,12 @@
 """Hypotheses of the theorem behind a proof, each decided on the enclosed solution of a claim."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TypeVar
 
-from polycorner.intervals.balls import bounds, decimals, dot
+from polycorner.intervals.balls import Ball, bounds, decimals, dot
 from polycorner.intervals.enclosures import Undecided
 from polycorner.minimisation import Problem
 from polycorner.proofs.definite import is_regular, pivots, positive_on_cone, tangent_form
@@ -15,8 +15,7 @@ from polycorner.proofs.invariance import Generator, annihilated, slope_bounds
 from polycorner.proofs.kkt import Enclosure, KKTSystem
 from polycorner.values import cached_property
 
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
+T = TypeVar("T")
 
 MOST_UNKNOWN = 4  # functions of unknown sign up to which all their signs are tried in a tree
 MOST_HALVINGS = 8  # of a cell, to decide the signs of inactive functions
@@ -69,14 +68,7 @@ def undecided(reason: str) -> ConditionResult:
 class Claim:
     """The claim that a face carries a minimum: its KKT system, modulo symmetries.
 
-    Attributes
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    system : KKTSystem
-        The KKT equations of the face.
-    fields : tuple of Generator
-        One for every gauge of the system.
+    There is a field for every gauge of the system.
     """
 
     problem: Problem
@@ -172,21 +164,34 @@ def inside(solved: Solved) -> ConditionResult:
     claim, enclosure = solved.claim, solved.enclosure
     if not claim.others:
         return _membership(solved, [])
-    waiting = [(tuple(enclosure.predictor.cell.reach), 0)]
-    found: dict[Status, ConditionResult] = {}
-    while waiting:
-        reach, depth = waiting.pop()
-        values = claim.system.formulas.values(enclosure.neighbourhood(reach), claim.others)
+
+    def decide(values: "Sequence[Ball]") -> tuple[ConditionResult, bool]:
         result = _membership(solved, values)
-        if result.status is Status.UNDECIDED and reach and depth < MOST_HALVINGS:
-            waiting += [(half, depth + 1) for half in _halves(reach)]
-            continue
+        return result, result.status is Status.UNDECIDED
+
+    found: dict[Status, ConditionResult] = {}
+    for result in _on_parts(claim, enclosure, decide):
         found[result.status] = result
         if result.status is Status.UNDECIDED:
             return result
         if len(found) > 1:
             return undecided(f"true on a part of the cell only: {found[Status.FAILED].reason}")
     return next(iter(found.values()))
+
+
+def _on_parts(
+    claim: Claim, enclosure: Enclosure, decide: "Callable[[Sequence[Ball]], tuple[T, bool]]"
+) -> Iterator[T]:
+    """Yield what values of the other functions say on parts of a cell, halved while it is open."""
+    waiting = [(tuple(enclosure.predictor.cell.reach), 0)]
+    while waiting:
+        reach, depth = waiting.pop()
+        values = claim.system.formulas.values(enclosure.neighbourhood(reach), claim.others)
+        result, is_open = decide(values)
+        if is_open and reach and depth < MOST_HALVINGS:
+            waiting += [(half, depth + 1) for half in _halves(reach)]
+        else:
+            yield result
 
 
 def _halves(reach: "tuple[Ball, ...]") -> "Iterator[tuple[Ball, ...]]":
@@ -429,16 +434,12 @@ def closed_on(claim: Claim, enclosure: Enclosure) -> list[int]:
 
     The cell is divided until they do not, as in :func:`inside`.
     """
-    waiting, found = [(tuple(enclosure.predictor.cell.reach), 0)], set[int]()
-    while waiting:
-        reach, depth = waiting.pop()
-        values = claim.system.formulas.values(enclosure.neighbourhood(reach), claim.others)
+
+    def decide(values: "Sequence[Ball]") -> tuple[set[int], bool]:
         some = {i for i, x in zip(claim.others, values, strict=True) if not (x > 0 or x < 0)}
-        if some and reach and depth < MOST_HALVINGS:
-            waiting += [(half, depth + 1) for half in _halves(reach)]
-        else:
-            found |= some
-    return sorted(found)
+        return some, bool(some)
+
+    return sorted(set[int]().union(*_on_parts(claim, enclosure, decide)))
 
 
 def of_a_choice(

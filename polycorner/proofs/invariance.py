@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph
-from polycorner.intervals.balls import dot
+from polycorner.intervals.balls import Ball, dot
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided, write
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.symmetry import vector_field
@@ -29,19 +29,12 @@ from polycorner.values import cached_property
 if TYPE_CHECKING:
     import sympy
 
-    from polycorner.intervals.balls import Ball
-
 
 @dataclass(frozen=True, eq=False)
 class Generator:
     """A vector field on a manifold, given by one component for each coordinate.
 
-    Attributes
-    ----------
-    manifold : Manifold
-        The manifold it is defined on.
-    components : tuple of SmoothFunction
-        One for each coordinate; constants are functions, too.
+    Components that are constant are functions, too.
     """
 
     manifold: Manifold

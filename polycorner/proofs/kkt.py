@@ -27,9 +27,11 @@ Since ``J`` is convex and all its matrices are regular, the inertia of the KKT m
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from polycorner.intervals.balls import (
+    Ball,
+    Matrix,
     ball,
     column,
     dot,
@@ -44,9 +46,6 @@ from polycorner.intervals.balls import (
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.values import cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball, Matrix
 
 FIRST_BITS = 128  # precision at which Newton's method starts; it then doubles
 MOST_STEPS = 25
@@ -462,14 +461,14 @@ def _base(
     return -(preconditioner * value)
 
 
-def widened(enclosure: Enclosure, attempts: int = 12) -> "list[Ball]":
+def widened(enclosure: Enclosure) -> "list[Ball]":
     """Return the widest box tried, without parameters, in which the solution is unique.
 
     If ``|I - Y J| w < w`` over the box of radii ``w``, no matrix in ``J`` is singular, and two
     solutions in the box would contradict the mean value theorem ([Neumaier] sec. 5.1).
     """
     predictor = enclosure.predictor
-    for power in range(1, attempts + 1):
+    for power in range(1, 13):
         candidate = [ball(0, ball(unit / 10**power)) for unit in predictor.system.units]
         linear = predictor.system.linear(predictor.unknowns(candidate), predictor.box(candidate))
         if isinstance(linear, Undecided):

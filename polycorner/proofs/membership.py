@@ -25,9 +25,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import inf, nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from polycorner.intervals.balls import ball, between, bounds, decimals, dot, exact, precision
+from polycorner.intervals.balls import Ball, ball, between, bounds, decimals, dot, exact, precision
 from polycorner.intervals.enclosures import Formulas, SmoothForms, Undecided
 from polycorner.intervals.tapes import Box, Tape
 from polycorner.minimisation import Problem
@@ -39,9 +39,6 @@ from polycorner.proofs.rattlers import reads
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.proofs.witnesses import Point, UnshownError, Witness
 from polycorner.values import Checked, Value, cached_property
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 MOST_DOUBLINGS = 3  # of the precision, while a sign is open
 SHOWN_DIGITS = 6  # of values in tables
@@ -173,12 +170,7 @@ def _middle(sides: tuple[str, str]) -> str:
 class Signs:
     """A polyhedron and an energy about a point: signs, enclosures and refutations.
 
-    Parameters
-    ----------
-    problem : Problem
-        The polyhedron and the energy.
-    bits : int
-        The working precision.
+    ``bits`` is the working precision.
     """
 
     def __init__(self, problem: Problem, bits: int) -> None:

@@ -6,13 +6,15 @@ from heapq import heappop, heappush
 from itertools import count, product
 from math import isfinite, nextafter, prod
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from polycorner import checks
 from polycorner.intervals.balls import (
+    Ball,
     ball,
+    balls,
     between,
     bounds,
     column,
@@ -39,9 +41,6 @@ from polycorner.proofs.hypotheses import (
 from polycorner.proofs.kkt import Cell, Enclosure, enclose, newton
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 CELL_BITS = 64
 MOST_STRIDES = 16  # into which a path through the parameters is divided
@@ -102,16 +101,9 @@ def cover(
 ) -> tuple[ParameterCell, ...]:
     """Divide a box of parameters into cells until all are decided or ``max_cells`` are reached.
 
-    Parameters
-    ----------
-    claim : Claim
-        Whose system has the parameters as inputs, in the order of ``sides``.
-    start : list of Ball
-        The unknowns at the parameters ``at``.
-    sides : mapping from str to (float, float)
-        The box.
-    progress : callable, optional
-        Called with the decided fraction of the box, 1, and the number of cells.
+    The claim's system has the parameters as inputs, in the order of ``sides``; ``start`` are the
+    unknowns at the parameters ``at``.  Progress is told the decided fraction of the box, 1, and the
+    number of cells.
     """
     names, whole = tuple(sides), prod(upper - lower for lower, upper in sides.values())
     order = count()
@@ -302,7 +294,7 @@ def check_unchanged(certificate: Certificate, formulas: Formulas) -> None:
     seen, gradients = problem.evaluate(point, 1)
     rows = range(problem.rows)
     with precision(CHECK_BITS):
-        now = formulas.values(Box([ball(x) for x in point.tolist()]), rows)
+        now = formulas.values(Box(balls(point)), rows)
     sizes = 1 + abs(seen) + np.nan_to_num(abs(gradients).max(axis=1), nan=np.inf, posinf=np.inf)
     for name, before, value, size in zip(formulas.names, seen, now, sizes, strict=True):
         if not (isfinite(before) and value.is_finite() and isfinite(size)):

@@ -7,19 +7,15 @@ Circles that rattle in a packing are the example.
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, exact
+from polycorner.intervals.balls import Ball, ball, exact, middles
 from polycorner.intervals.enclosures import Formulas
 from polycorner.intervals.tapes import Box
 from polycorner.minimisation import Problem
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-    from polycorner.spaces.manifold import Array
+from polycorner.spaces.manifold import Array
 
 Room = dict[int, Fraction]
 REACH = 0.1  # of the first of these steps, in scale units
@@ -39,13 +35,7 @@ def reads(formulas: Formulas, row: int) -> frozenset[int]:
 class Rattlers:
     """Coordinates that rattle, and the functions that read them.
 
-    Parameters
-    ----------
-    problem : Problem
-    formulas : Formulas
-        Its inequalities, equations and energy.
-    coordinates : sequence of int
-        Those that neither the energy nor equations nor functions that support read.
+    Neither the energy nor equations nor functions that support read these coordinates.
     """
 
     def __init__(self, problem: Problem, formulas: Formulas, coordinates: Sequence[int]) -> None:
@@ -57,7 +47,7 @@ class Rattlers:
     def _reading(self, some: Sequence[int]) -> list[int]:
         return [i for i, row in enumerate(self._read) if not row.isdisjoint(some)]
 
-    def _distances(self, q: "Array") -> "tuple[Array, Array]":
+    def _distances(self, q: Array) -> tuple[Array, Array]:
         """Return distances to the zeros of the functions along these coordinates, and normals."""
         values, gradients = self.problem.evaluate(q, 1)
         scales = self.problem.scales[self.coordinates]
@@ -66,7 +56,7 @@ class Rattlers:
         steep = sizes > 0  # others, at their maximum here, stand in no way
         return values[self.rows][steep] / sizes[steep], table[steep] / sizes[steep, None]
 
-    def _middle(self, q: "Array") -> "Array":
+    def _middle(self, q: Array) -> Array:
         """Return a point at which the functions are as large as can be found."""
         best, places, reach = np.array(q), self.coordinates, REACH
         cost = np.append(np.zeros(len(places)), -1.0)
@@ -94,14 +84,10 @@ class Rattlers:
         """Return a centre and half sides of the room, in scale units, or None where none is shown.
 
         All sides grow alike first, then one after the other, while the functions that read these
-        coordinates are positive.
-
-        Parameters
-        ----------
-        hull : list of Ball
-            All coordinates; the others are enclosed, those that rattle are where they are.
+        coordinates are positive.  Of all coordinates in ``hull`` the others are enclosed; those
+        that rattle are where they are.
         """
-        q = self._middle(np.array([float(x.mid()) for x in hull]))
+        q = self._middle(middles(hull))
         centre = [exact(x.mid()) for x in hull]
         for j in self.coordinates:
             centre[j] = Fraction(q[j])

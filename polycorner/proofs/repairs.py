@@ -8,12 +8,12 @@ any size are seen; residuals are computed in balls.  What it finds is proved or 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
-from polycorner.intervals.balls import ball, exact, precision, solve_exactly
+from polycorner.intervals.balls import ball, exact, middles, precision, solve_exactly
 from polycorner.intervals.enclosures import Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
@@ -22,11 +22,9 @@ from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.membership import Bounds, BoxPart, Signs, Violation
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.proofs.witnesses import Point
+from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.spaces.manifold import Array
 
 MOST_STEPS, MOST_MARGINS, MOST_BRANCHES = 40, 6, 8
 DIGITS_A_STEP = 5  # that a linear programme wins at least
@@ -45,13 +43,13 @@ class _Model(Value):
     margin of all inequalities.
     """
 
-    rows: "Array"
-    levels: "Array"
-    fixed: "Array"
-    offsets: "Array"
-    slope: "Array"
-    low: "Array"
-    high: "Array"
+    rows: Array
+    levels: Array
+    fixed: Array
+    offsets: Array
+    slope: Array
+    low: Array
+    high: Array
 
     def solve(self, goal: int, limits: Mapping[int, tuple[float, float | None]]) -> Any:
         """Return HiGHS's result for the least lost energy (0), step (1) or negative margin (2)."""
@@ -77,7 +75,7 @@ class _Model(Value):
             options={"primal_feasibility_tolerance": DEFAULT.feasible},
         )  # fmt: skip
 
-    def step(self, margin: float, room: float) -> "Array | None":
+    def step(self, margin: float, room: float) -> Array | None:
         """Return the least step, or the one that loses the least energy within some room."""
         n = self.rows.shape[1]
         limits: dict[int, tuple[float, float | None]] = {2: (margin, margin)}
@@ -180,7 +178,7 @@ class Repair:
         unit = Fraction(2) ** power if most else self.target
         return dict(zip(rows, values, strict=True)), unit
 
-    def _gradients(self, q: Point) -> "Array":
+    def _gradients(self, q: Point) -> Array:
         return self.place.problem.evaluate(_doubles(q), 1)[1]
 
     def _lies_in(self, q: Point) -> bool:
@@ -364,7 +362,7 @@ class Repair:
         values, _ = forms.evaluate(Box(part.centre), 1)
         _, gradients = forms.evaluate(part.box, 1)
         halves = np.array([float(half) for half in part.halves])
-        middle = np.array([[float(x.mid()) for x in row] for row in gradients])
+        middle = middles(gradients)
         middle = middle.reshape(len(kept), len(halves)) * halves
         spread = np.array([[float(x.rad()) for x in row] for row in gradients])
         spread = spread.reshape(middle.shape) * halves
@@ -372,7 +370,7 @@ class Repair:
         if not np.isfinite(spread.sum() + sizes.sum()) or not sizes.any():
             return int(halves.argmax())
         sizes[sizes == 0] = 1.0
-        levels = np.array([float(x.mid()) for x in values]) / sizes
+        levels = middles(values) / sizes
         both = [i for i, row in enumerate(kept) if row in self.place.equations]
         table = np.vstack([middle / sizes[:, None], -(middle / sizes[:, None])[both]])
         heights = np.concatenate([levels, -levels[both]])
@@ -395,7 +393,7 @@ class Repair:
         return int((abs(weights) @ spread).argmax())
 
 
-def _doubles(q: Point) -> "Array":
+def _doubles(q: Point) -> Array:
     """Return the nearest doubles, infinite where there are none."""
     most = Fraction(np.finfo(np.float64).max)
     return np.array([float(x) if abs(x) <= most else np.inf for x in q])

@@ -9,17 +9,22 @@ enclosures show it.
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from math import isqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph, Payload
-from polycorner.intervals.balls import ball, constant, current_precision, exact, operations, roots
+from polycorner.intervals.balls import (
+    Ball,
+    ball,
+    constant,
+    current_precision,
+    exact,
+    operations,
+    roots,
+)
 from polycorner.intervals.enclosures import Formulas
 from polycorner.proofs import polynomials as algebra
 from polycorner.proofs.polynomials import Polynomial, TooLargeError
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 ZERO = Fraction(0)
 ONE = Fraction(1)
@@ -33,10 +38,7 @@ Key = tuple[Any, ...]
 class Symbols:
     """The symbols of polynomials: each is an open coordinate, a constant or an operation.
 
-    Attributes
-    ----------
-    places : dict from int to Ball
-        Enclosures of open coordinates that stand for one number each.
+    ``places`` are enclosures of open coordinates that stand for one number each.
     """
 
     def __init__(self) -> None:
@@ -56,11 +58,7 @@ class Symbols:
     def algebraic(self, coefficients: Sequence[int], near: "Ball") -> Polynomial | None:
         """Return the symbol of the real root in a ball, if there is one and no other root is near.
 
-        Parameters
-        ----------
-        coefficients : sequence of int
-            Of the polynomial, the constant first; the last is not 0.
-        near : Ball
+        The constant coefficient comes first; the last is not 0.
         """
         every = roots(tuple(coefficients), current_precision())
         alike = [x for x in every if x.real.overlaps(near)]

@@ -35,12 +35,11 @@ It is a statement in one chart: coordinates of circles are taken as real numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 from polycorner import checks
 from polycorner.intervals.balls import (
     MOST_DIGITS,
-    ball,
+    balls,
     between,
     bounds,
     decimals,
@@ -49,6 +48,7 @@ from polycorner.intervals.balls import (
 )
 from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
+from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, Verdict
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.progress import Progress, silent
@@ -73,10 +73,6 @@ from polycorner.proofs.parameter_boxes import (
 from polycorner.proofs.proof import DOUBLE_DIGITS, Bounds, Proof
 from polycorner.proofs.rattlers import Rattlers, reads
 from polycorner.proofs.witnesses import Gauge
-from polycorner.signatures import shown
-
-if TYPE_CHECKING:
-    pass
 
 SHOWN_DIGITS = 3  # of what the given point violates
 MOST_CELLS = 10_000_000
@@ -88,7 +84,7 @@ ROOM, ROOM_DIGITS = "room", 6
 BOX_DIGITS = 3  # digits beyond those of the enclosures, for the box that contains them
 
 
-@shown
+@checked
 def prove(
     certificate: Certificate,
     *,
@@ -151,13 +147,8 @@ def prove(
     >>> p.proved, p.enclosures["multiplier bowl"]
     (True, ('1.0000000', '1.0000000'))
     """
-    checks.instance("certificate", certificate, Certificate)
     checks.whole("digits", digits, least=1, most=MOST_DIGITS)
     checks.whole("max_cells", max_cells, least=1, most=MOST_CELLS)
-    if symmetry is not None:
-        checks.instance("symmetry", symmetry, Symmetry)
-    if not callable(progress):
-        checks.refuse("progress", "a function (done, total, note)", progress, TypeError)
     problem = certificate.problem
     d = problem.polyhedron
     fields = generators(d.manifold, symmetry.fields if symmetry else ())
@@ -213,7 +204,7 @@ def _at_once(
 def _outside(certificate: Certificate, formulas: Formulas) -> dict[str, str]:
     """Return what the certificate's point violates, taken exactly, in the best branch."""
     d, m = certificate.problem.polyhedron, certificate.problem.inequalities
-    point = Box([ball(x) for x in certificate.point.tolist()])
+    point = Box(balls(certificate.point))
     values = formulas.values(point, range(m + len(d.equations)))
     broken = [i for i, value in enumerate(values) if (value < 0 if i < m else value != 0)]
     signs = [-1 if i in broken else 1 for i in range(m)]

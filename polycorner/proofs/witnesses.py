@@ -5,15 +5,31 @@ Symbols are those of :mod:`~polycorner.proofs.growth`.
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TypeVar
 
+from polycorner.intervals.enclosures import Undecided
 from polycorner.proofs.invariance import Generator
 from polycorner.values import Value
 
 Point = tuple[Fraction, ...]
+T = TypeVar("T")
 
 
 class UnshownError(Exception):
     """A hypothesis that is not shown, in a sentence."""
+
+
+def need(condition: object, reason: str) -> None:
+    """Raise UnshownError unless a condition holds."""
+    if not condition:
+        raise UnshownError(reason)
+
+
+def decided(found: T | Undecided) -> T:
+    """Return what was found; raise UnshownError where it is undecided."""
+    if isinstance(found, Undecided):
+        raise UnshownError(str(found))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,10 @@
 import copy
 import json
 import os
-import zipfile
 
 import pytest
 import sympy
+from proof_files import parts_of
 
 from polycorner import Manifold, Polyhedron, SmoothFunction
 from polycorner.branches import branches, prove_branches
@@ -24,8 +24,7 @@ def good(tmp_path_factory):
     found = stationary_on(Polyhedron(LINE, {"wall": x}), energy, [0], ("wall",))
     proof = prove_branches(branches(found, "t", (-1.0, 1.0)), box=[(-1, 3)])
     path = proof.save(tmp_path_factory.mktemp("hostile") / "diagram.zip")
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
+    return parts_of(path)
 
 
 def with_data(parts, change):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import sympy
 from flint import arb
-from proof_files import verdict
+from proof_files import described, parts_of, rewritten, verdict
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, Symmetry, minimise, stationary_on
 from polycorner.branches import BranchProofOptions, branches, prove_branches
@@ -18,8 +18,6 @@ from polycorner.intervals.enclosures import Formulas
 from polycorner.polyhedra import Element
 from tests.branches.test_normal_forms import CASES, diagram
 from tests.branches.test_proofs import WRONG
-from tests.branches.test_saved_diagrams import described, rewritten
-from tests.proofs.lists.test_forged_lists import parts_of
 
 t = sympy.Symbol("t")
 LINE, PLANE, SPACE = (Manifold.euclidean(names) for names in ("x", "x y", "x y z"))
@@ -216,7 +214,7 @@ def test_forged_symmetries_and_arms_are_refused(tmp_path):
         [mirror | {"equations": [[0, 1]]}],
     ):
         told = data | {"symmetries": symmetries}
-        assert not verdict(rewritten(tmp_path / "forged.zip", parts, told))[0], symmetries
+        assert not verdict(rewritten(tmp_path / "forged.zip", told, parts))[0], symmetries
     (number,) = [k for k, e in enumerate(data["events"]) if e["kind"] == "branch"]
     there = [k for k, arc in enumerate(data["arcs"]) if number in arc["events"]]
     assert len(there) == 4
@@ -224,16 +222,16 @@ def test_forged_symmetries_and_arms_are_refused(tmp_path):
         told = copy.deepcopy(data)
         side = told["arcs"][one]["events"].index(number)
         told["arcs"][one]["zeros"][side] = [told["inequalities"] + 3]
-        assert not verdict(rewritten(tmp_path / "forged.zip", parts, told))[0]
+        assert not verdict(rewritten(tmp_path / "forged.zip", told, parts))[0]
         for two in there:
             if one != two:
                 told = copy.deepcopy(data)
                 told["arcs"][one]["points"] = data["arcs"][two]["points"]
-                assert not verdict(rewritten(tmp_path / "forged.zip", parts, told))[0]
+                assert not verdict(rewritten(tmp_path / "forged.zip", told, parts))[0]
     energy = copy.deepcopy(data)
     (cosine,) = [k for k, node in enumerate(energy["nodes"]) if node[0] == "cos"]
     energy["nodes"][cosine][0] = "sin"
-    assert not verdict(rewritten(tmp_path / "forged.zip", parts, energy))[0]
+    assert not verdict(rewritten(tmp_path / "forged.zip", energy, parts))[0]
 
 
 def test_signs_of_equations_are_checked(tmp_path):
@@ -243,7 +241,7 @@ def test_signs_of_equations_are_checked(tmp_path):
     assert sorted(mirror["equations"]) == [[0, -1], [1, 1]]
     for equations in ([], [[0, 1], [1, 1]], [[0, -1]], [[0, -1], [0, -1]], [[1, 1], [0, -1]]):
         told = data | {"symmetries": [mirror | {"equations": equations}]}
-        assert not verdict(rewritten(tmp_path / "forged.zip", parts, told))[0], equations
+        assert not verdict(rewritten(tmp_path / "forged.zip", told, parts))[0], equations
 
 
 # ------------------------------------------------------------------------------------ the equations

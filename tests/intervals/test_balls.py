@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import mpmath
 import pytest
+from enclosing import precise
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -43,12 +44,6 @@ TWO = {
 numbers = st.floats(-5, 5, allow_subnormal=False)
 shares = st.floats(0, 1)
 widths = st.sampled_from([0.0, 1e-12, 1e-3, 0.5])
-
-
-def precise(x):
-    """Return a fraction as an mpmath number."""
-    x = Fraction(x)
-    return mpmath.mpf(x.numerator) / x.denominator
 
 
 def within(value, b):

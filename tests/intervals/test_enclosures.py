@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from enclosing import precise
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import smooth_expressions
@@ -35,11 +36,6 @@ def formulas(*expressions, manifold=M2, **options):
 
 def box(*sides):
     return Box([between(*side) for side in sides])
-
-
-def precise(number):
-    number = Fraction(number)
-    return mpmath.mpf(number.numerator) / number.denominator
 
 
 def inside(expression, at, enclosure):

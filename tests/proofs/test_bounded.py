@@ -1,10 +1,11 @@
 """Minima between two energies, at corners with more contacts than balls can show to close."""
 
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 import pytest
 import sympy as sp
+from packed_circles import circles, torus
 
 from benchmarks.trials.rational_corners import MINIMA, OTHERS, corners
 from benchmarks.trials.run_corners import judged
@@ -17,22 +18,6 @@ SEVEN = [
     (0.348915260374, 0.825542369813), (0.523372890561, 0.523372890561),
     (0.174457630187, 0.523372890561), (0.7960, 0.7960), (0.825542369813, 0.348915260374),
 ]  # fmt: skip
-
-
-def circles(centres, side=1):
-    """Return the packings of equal circles in a square, and the point of given centres."""
-    n = len(centres)
-    manifold = Manifold.euclidean(" ".join(f"x{i} y{i}" for i in range(n)) + " r")
-    *z, r = manifold.symbols
-    walls = {f"{s}low": s - r for s in z} | {f"{s}high": side - r - s for s in z}
-    gaps = {
-        f"gap{i}_{j}": (z[2 * i] - z[2 * j]) ** 2 + (z[2 * i + 1] - z[2 * j + 1]) ** 2 - 4 * r**2
-        for i, j in combinations(range(n), 2)
-    }
-    c = np.array(centres)
-    apart = min(np.linalg.norm(a - b) for a, b in combinations(c, 2)) / 2
-    radius = min(apart, c.min(), (float(side) - c).min())
-    return Polyhedron(manifold, {**walls, **gaps}), -r, np.append(c.ravel(), radius)
 
 
 def energies(proof):
@@ -116,14 +101,7 @@ def test_a_coordinate_that_nothing_reads_at_a_strict_minimum_has_room():
 
 def test_translations_of_a_torus_are_factored_out():
     # Two circles in a square torus: the best touch at a diagonal, all four images of one.
-    manifold = Manifold.euclidean("x0 y0 x1 y1 r")
-    x0, y0, x1, y1, r = manifold.symbols
-    gaps = {
-        f"gap{a}{b}": (x0 - x1 - a) ** 2 + (y0 - y1 - b) ** 2 - 4 * r**2
-        for a in (0, 1) for b in (0, 1)
-    }  # fmt: skip
-    polyhedron = Polyhedron(manifold, gaps)
-    proof = prove(certify(polyhedron, -r, [0.8, 0.7, 0.3, 0.2, 0.125**0.5]))
+    proof = prove(certify(*torus()))
     assert proof.proved
     assert len(proof.symmetry) == 2
     low, high = energies(proof)

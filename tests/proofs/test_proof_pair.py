@@ -5,6 +5,7 @@ from fractions import Fraction
 import mpmath
 import pytest
 import sympy as sp
+from enclosing import contains
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,15 +16,6 @@ from polycorner.proofs import prove
 from polycorner.proofs.hypotheses import CURVED
 
 CORNER = ("A2B1", "A2b", "aB1")
-
-
-def precise(text):
-    number = Fraction(text)
-    return mpmath.mpf(number.numerator) / number.denominator
-
-
-def contains(sides, truth):
-    return precise(sides[0]) <= truth <= precise(sides[1])
 
 
 def width(sides):

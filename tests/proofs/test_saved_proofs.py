@@ -5,23 +5,17 @@ oracle evaluates the program of the file in plain floating-point numbers, descen
 around with a method of SciPy, and compares.
 """
 
-import copy
-import json
 import math
 import re
-import shutil
-import subprocess
-import sys
-import zipfile
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 
 import flint
 import numpy as np
 import pytest
 import sympy as sp
-from proof_files import verdict
+from packed_circles import circles, torus
+from proof_files import described, rewritten, said_alone, verdict, with_value
 from scipy.optimize import minimize
 
 from polycorner import AnyOf, Manifold, Polyhedron, certify
@@ -29,7 +23,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.intervals.balls import precision
 from polycorner.intervals.enclosures import Formulas
 from polycorner.polyhedra.symmetry import Symmetry
-from polycorner.proofs import checker, prove
+from polycorner.proofs import prove
 from polycorner.proofs.attempt import bits_for
 from polycorner.proofs.bounded import BoundedMinimum
 from polycorner.proofs.bounded_search import bounded_minimum
@@ -42,33 +36,6 @@ u, v, w = SPACE.symbols
 PAIR = Manifold.euclidean("a b c d")
 a, b, c, d = PAIR.symbols
 ROOT = 0.5**0.5
-
-
-def circles(centres):
-    """Return the packings of equal circles in the unit square, and the point of given centres."""
-    n = len(centres)
-    manifold = Manifold.euclidean(" ".join(f"x{i} y{i}" for i in range(n)) + " r")
-    *z, r = manifold.symbols
-    walls = {f"{s}low": s - r for s in z} | {f"{s}high": 1 - r - s for s in z}
-    gaps = {
-        f"gap{i}_{j}": (z[2 * i] - z[2 * j]) ** 2 + (z[2 * i + 1] - z[2 * j + 1]) ** 2 - 4 * r**2
-        for i in range(n) for j in range(i + 1, n)
-    }  # fmt: skip
-    where = np.array(centres)
-    apart = [np.linalg.norm(p - q) / 2 for i, p in enumerate(where) for q in where[:i]]
-    radius = min(*apart, where.min(), (1 - where).min())
-    return Polyhedron(manifold, walls | gaps), -r, [*where.ravel(), radius]
-
-
-def torus():
-    """Return two circles in a square torus, of which one touches four images of the other."""
-    manifold = Manifold.euclidean("x0 y0 x1 y1 r")
-    x0, y0, x1, y1, r = manifold.symbols
-    gaps = {
-        f"gap{i}{j}": (x0 - x1 - i) ** 2 + (y0 - y1 - j) ** 2 - 4 * r**2
-        for i in (0, 1) for j in (0, 1)
-    }  # fmt: skip
-    return Polyhedron(manifold, gaps), -r, [0.8, 0.7, 0.3, 0.2, 0.125**0.5]
 
 
 S = (2**0.5 - 1) / 2
@@ -187,20 +154,7 @@ def test_saving_leaves_the_working_precision(saved):
 
 
 def test_the_checker_runs_without_polycorner(saved, tmp_path):
-    shutil.copytree(Path(checker.__file__).parent, tmp_path / "checker")
-    script = (
-        "import sys; sys.modules['polycorner'] = None; import runpy; sys.argv = ['checker', {!r}];"
-    )
-    run = script.format(str(saved("torus"))) + "runpy.run_module('checker', run_name='__main__')"
-    result = subprocess.run(
-        [sys.executable, "-c", run],
-        cwd=tmp_path,
-        env={},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert result.stdout.strip() == verdict(saved("torus"))[1], result.stderr
+    assert said_alone(saved("torus"), tmp_path) == verdict(saved("torus"))[1]
 
 
 def test_what_is_not_proved_is_not_saved(tmp_path):
@@ -346,19 +300,9 @@ def entries(value, place=(), most=5):
             yield from entries(value[i], (*place, i))
 
 
-def replaced(data, place, value):
-    data = copy.deepcopy(data)
-    part = data
-    for key in place[:-1]:
-        part = part[key]
-    part[place[-1]] = value
-    return data
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_whatever_is_changed_what_is_printed_is_true(name, saved, tmp_path):
-    with zipfile.ZipFile(saved(name)) as archive:
-        original = json.loads(archive.read("problem.json"))
+    original = described(saved(name))
     truth, count, path = verdict(saved(name))[1], 0, tmp_path / "changed.zip"
     judge(original, truth)
     for place in entries(original):
@@ -366,10 +310,8 @@ def test_whatever_is_changed_what_is_printed_is_true(name, saved, tmp_path):
         for key in place:
             part = part[key]
         for value in alternatives(part):
-            data = replaced(original, place, value)
-            with zipfile.ZipFile(path, "w") as archive:
-                archive.writestr("problem.json", json.dumps(data))
-            fine, line = verdict(path)
+            data = with_value(original, place, value)
+            fine, line = verdict(rewritten(path, data))
             same_problem = place[0] in {"evidence", "periods"} and line == truth
             if fine and not same_problem:
                 judge(data, line)
@@ -392,17 +334,6 @@ def box(tmp_path_factory):
     found = certify(Polyhedron(PLANE, walls), energy, [0.49, math.sin(0.49)])
     proof = prove(found, parameters={"beta": (0.5, 2.0), "slope": (0.5, 1.0)})
     return proof.save(tmp_path_factory.mktemp("boxes") / "box.zip")
-
-
-def described(path):
-    with zipfile.ZipFile(path) as archive:
-        return json.loads(archive.read("problem.json"))
-
-
-def rewritten(path, data):
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("problem.json", json.dumps(data))
-    return path
 
 
 def bounds(line):
@@ -434,7 +365,7 @@ def test_changed_boxes_are_refused_or_true(box, tmp_path):
                 z = float.fromhex(part)
                 some = [a.hex() for a in (-z, z + 1, z / 2, 1.1 * z, math.inf, math.nan)]
             for value in some:
-                data = replaced(original, place, value)
+                data = with_value(original, place, value)
                 fine, line = verdict(rewritten(tmp_path / "changed.zip", data))
                 refused += not fine
                 if fine and key in {"lower", "upper"}:

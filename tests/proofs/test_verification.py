@@ -7,6 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from enclosing import contains, precise
 from problems import REGULAR, hs13, hs26
 
 from polycorner import (
@@ -31,15 +32,6 @@ x, y = M.symbols
 
 def proof_at(parts, energy, q, **options):
     return prove(certify(Polyhedron(M, parts), energy, q), **options)
-
-
-def precise(text):
-    number = Fraction(text)
-    return mpmath.mpf(number.numerator) / number.denominator
-
-
-def contains(sides, truth):
-    return precise(sides[0]) <= truth <= precise(sides[1])
 
 
 # ------------------------------------------------------------------------------------- what is said

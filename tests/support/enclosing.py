@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 
+import mpmath
 import numpy as np
 
 from polycorner.intervals.balls import ball, bounds, precision
@@ -9,6 +10,17 @@ from polycorner.intervals.enclosures import Formulas, Undecided
 from polycorner.intervals.tapes import Box
 
 BITS = 160
+
+
+def precise(number):
+    """Return a fraction, or its text, as an mpmath number."""
+    number = Fraction(number)
+    return mpmath.mpf(number.numerator) / number.denominator
+
+
+def contains(sides, truth):
+    """Whether a number lies between two bounds, given as texts."""
+    return precise(sides[0]) <= truth <= precise(sides[1])
 
 
 def misses(true, low, high):

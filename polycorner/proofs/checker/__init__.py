@@ -16,7 +16,7 @@ in ball arithmetic of 128 bits, that
 Boxes for which this is not shown at once are bisected.  Krawczyk's operator ([Neumaier] sec. 5.1)
 shows that a region has one KKT point with positive multipliers, and a locus one zero of the
 derivative of the energy in the coordinates that it depends on; or more functions than coordinates
-hold a point to first order, and leave no other one in its region (``pinned.py``).  The list must
+hold a point to first order, and leave no other one in its region (``faces.py``).  The list must
 consist of all regions whose point is stationary and not outside the domain, with their indices.
 
 In a list of corners each set of functions that may vanish in a box vanishes nowhere there, or at

@@ -18,7 +18,7 @@ from typing import Any
 
 from flint import arb
 
-from .balls import NotShownError, dot, need, negatives, places
+from .balls import NotShownError, dot, need, negatives_along, places
 from .curves import StoredFace, StoredFamily, Tube, between
 from .statement import zero_near
 
@@ -191,11 +191,9 @@ class StoredArc:
             except NotShownError:
                 continue
             n = face.n
-            rows = [row[:n] for row in jacobian[n:-1]]
-            form = [[*jacobian[i][:n], *(row[i] for row in rows)] for i in range(n)]
-            form += [[*row, *[arb(0)] * len(rows)] for row in rows]
-            found = negatives(form)
+            *rows, _ = [row[:n] for row in jacobian]
+            found = negatives_along(rows[:n], rows[n:])
             if found is not None:
-                return found - len(rows)
+                return found
         msg = f"{self.name}: the index is not decided"
         raise NotShownError(msg)

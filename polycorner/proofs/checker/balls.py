@@ -85,6 +85,27 @@ def turn(x: arb, lower: float, upper: float, period: arb | None) -> arb:
     return round(float((away / period).mid())) * period if period else ZERO
 
 
+def column(numbers: Sequence[Any]) -> arb_mat:
+    return arb_mat([[x] for x in numbers])
+
+
+def fitted(a: arb_mat, right: arb_mat) -> list[arb]:
+    """Enclose the solution of equations that have one, by nearly an inverse from the left."""
+    middle = a.mid().transpose()
+    left = (middle * a.mid()).inv().mid() * middle
+    return list((left * a).solve(left * right).entries())
+
+
+def krawczyk(here: Any, there: Any, apart: Sequence[arb]) -> list[arb]:
+    """Return the displacements to which Krawczyk's operator maps those of a box.
+
+    ``here`` are values and derivatives of the equations at a point, ``there`` on the box.
+    """
+    inverse = arb_mat(here[1]).mid().inv().mid()
+    defect = arb_mat(len(apart), len(apart), 1) - inverse * arb_mat(there[1])
+    return list((defect * column(apart) - inverse * column(here[0])).entries())
+
+
 def definite(rows: list[list[arb]]) -> bool:
     """Whether all symmetric matrices in an enclosure are positive definite, by elimination."""
     if not rows:
@@ -109,6 +130,13 @@ def negatives(form: list[list[arb]]) -> int | None:
     return sum(x < 0 for x in found) if all(x < 0 or x > 0 for x in found) else None
 
 
+def negatives_along(form: list[list[arb]], rows: list[list[arb]]) -> int | None:
+    """Return the same on the vectors that rows annihilate: each adds an eigenvalue of each sign."""
+    bordered = [[*line, *(row[i] for row in rows)] for i, line in enumerate(form)]
+    found = negatives(bordered + [[*row, *[ZERO] * len(rows)] for row in rows])
+    return None if found is None else found - len(rows)
+
+
 def zero(equations: Callable[..., Any], unknowns: list[arb]) -> list[arb] | None:
     """Return a small enclosure of the only zero in a box by Krawczyk's operator, or None."""
     if not unknowns:  # a space of no dimension is one point
@@ -118,13 +146,10 @@ def zero(equations: Callable[..., Any], unknowns: list[arb]) -> list[arb] | None
         centre = [x.mid() for x in unknowns]
         here, there = equations(centre), equations(unknowns)
         try:
-            inverse = arb_mat(here[1]).mid().inv().mid()
+            steps = krawczyk(here, there, [x - c for x, c in zip(unknowns, centre, strict=True)])
         except (TypeError, ZeroDivisionError):
             return None
-        apart = arb_mat([[x - c] for x, c in zip(unknowns, centre, strict=True)])
-        defect = arb_mat(len(centre), len(centre), 1) - inverse * arb_mat(there[1])
-        steps = defect * apart - inverse * arb_mat([[r] for r in here[0]])
-        image = [c + x for c, x in zip(centre, steps.entries(), strict=True)]
+        image = [c + x for c, x in zip(centre, steps, strict=True)]
         pairs = list(zip(unknowns, image, strict=True))
         if not shown and not all(x.contains_interior(y) for x, y in pairs):
             return None

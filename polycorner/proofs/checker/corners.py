@@ -6,11 +6,11 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .algebra import Algebra, TooMuchError, total
-from .balls import ZERO, different, dot, hull, need, nothing, number
+from .balls import ZERO, column, different, dot, hull, need, nothing, number
+from .faces import StoredVertex
 from .problem import StoredProblem
 from .proof import StoredProof
 from .symmetries import POINTS, symmetries
-from .vertices import StoredVertex
 
 SHIFT = 2.0**-30
 
@@ -161,7 +161,7 @@ class StoredBox:
         except ZeroDivisionError:
             return False
         for weights in (inverse, (middle.transpose() * inverse).mid()):
-            sums = weights * values + weights * arb_mat(slopes) * arb_mat([[x] for x in away])
+            sums = weights * values + weights * arb_mat(slopes) * column(away)
             if any(x > 0 or x < 0 for x in sums.entries()):
                 return True
         return False

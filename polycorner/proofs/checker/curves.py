@@ -21,7 +21,7 @@ from typing import Any
 
 from flint import arb, arb_mat, ctx
 
-from .balls import NAN, ZERO, NotShownError, dot, need, square
+from .balls import NAN, ZERO, NotShownError, column, dot, need, square
 from .jets import Jet
 from .problem import StoredProgram
 from .rationals import ratios
@@ -208,7 +208,7 @@ def solved(rows: list[list[arb]], right: Sequence[arb]) -> list[arb]:
     try:
         backwards = arb_mat(rows).mid().inv().mid()
         form = backwards * arb_mat(rows)
-        return list(form.solve(backwards * arb_mat([[y] for y in right])).entries())
+        return list(form.solve(backwards * column(right)).entries())
     except ZeroDivisionError:
         msg = "equations are not shown to be regular"
         raise NotShownError(msg) from None
@@ -233,12 +233,12 @@ class Tube:
         self.tangent = [self.backwards[i, last] for i in range(face.size)]
         delta = PART * reach
         self.line = [c + t * delta for c, t in zip(self.centre, self.tangent, strict=True)]
-        moved = (arb_mat(jacobian) * arb_mat([[t] for t in self.tangent])).entries()
+        moved = (arb_mat(jacobian) * column(self.tangent)).entries()
         moved[last] -= 1
         half = ZERO.union(reach**2 / 2)
         bend = face.second(self.line, self.tangent)
         left = [v + m * delta + b * half for v, m, b in zip(values, moved, bend, strict=True)]
-        self.enclose(-(self.backwards * arb_mat([[y] for y in left])))
+        self.enclose(-(self.backwards * column(left)))
 
     @classmethod
     def between(cls, face: StoredFace, one: Sequence[arb], two: Sequence[arb]) -> "Tube":
@@ -261,7 +261,7 @@ class Tube:
             box = [PART * (GROWTH * y.abs_upper() + s) for y, s in zip(image, least, strict=True)]
             rows = self.derivatives([a + b for a, b in zip(self.line, box, strict=True)])
             form = self.backwards * arb_mat(rows)
-            image = (base + (unit - form) * arb_mat([[y] for y in box])).entries()
+            image = (base + (unit - form) * column(box)).entries()
             if all(x.contains_interior(y) for x, y in zip(box, image, strict=True)):
                 self.alone, self.rows = box, rows
                 self.x = [a + b for a, b in zip(self.line, image, strict=True)]
@@ -299,7 +299,7 @@ class Tube:
             away = arb_mat([[a - b] for a, b in zip(x, middle, strict=True)])
             pin = -dot(self.normal, away.entries())
             moved = (unit - self.backwards * arb_mat(rows)) * away
-            moved -= self.backwards * arb_mat([[y] for y in (*values, pin)])
+            moved -= self.backwards * column((*values, pin))
             new = [a + b for a, b in zip(middle, moved.entries(), strict=True)]
             if not all(a.overlaps(b) for a, b in zip(x, new, strict=True)):
                 return []

@@ -38,7 +38,20 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .arcs import StoredArc, Watched
-from .balls import BITS, NAN, ZERO, NotShownError, different, dot, hull, need, places, turn
+from .balls import (
+    BITS,
+    NAN,
+    ZERO,
+    NotShownError,
+    column,
+    different,
+    dot,
+    fitted,
+    hull,
+    need,
+    places,
+    turn,
+)
 from .curves import StoredFace, StoredFamily, Tube
 from .events import StoredEvent, StoredImage
 from .problem import DIAGRAM, StoredProblem, StoredProgram
@@ -242,19 +255,17 @@ class StoredDiagram(StoredProof):
         n, pairs = face.n, list(zip(face.signed, face.rows, strict=True))
         table = [[s * slopes[row].get(i, ZERO) for s, row in pairs] for i in range(n)]
         rows = arb_mat([*table, face.counted])
-        right = arb_mat([[ZERO]] * n + [[arb(1)]])
+        right = column([*[ZERO] * n, arb(1)])
         unit = [ZERO.union(arb(1)) if c == 1 else None for c in face.counted]
         try:
-            middle = rows.mid().transpose()
-            left = (middle * rows.mid()).inv().mid() * middle
-            found = (left * rows).solve(left * right).entries()
+            found = fitted(rows, right)
         except ZeroDivisionError:
             return None if None in unit else [x for x in unit if x is not None]
         pairs = list(zip(found, unit, strict=True))
         if any(b is not None and not a.overlaps(b) for a, b in pairs):
             return []
         mu = [a if b is None else a.intersection(b) for a, b in pairs]
-        fits = zip((rows * arb_mat([[x] for x in mu])).entries(), right.entries(), strict=True)
+        fits = zip((rows * column(mu)).entries(), right.entries(), strict=True)
         return mu if all(x.contains(y) for x, y in fits) else []
 
     # ------------------------------------------------------------------------------------- words

@@ -34,7 +34,7 @@ from flint import arb, arb_mat
 
 from .algebra import total
 from .arcs import StoredArc, Watched
-from .balls import ZERO, NotShownError, dot, need, negatives, places
+from .balls import ZERO, NotShownError, dot, need, negatives_along, places
 from .curves import StoredFace, StoredFamily, Tube, solved
 from .pitchforks import StoredPitchfork
 from .statement import zero_near
@@ -167,18 +167,10 @@ class StoredEvent:
         arc.close(side, x)
         self.curves.append((face, x, face.kernel(x)))
         # One gradient depends on the others: the first, as its multiplier is not 0.
-        found = self.negative(jacobian, [row[:n] for row in rows[1:]], n)
+        form = [row[:n] for row in jacobian[:n]]
+        found = negatives_along(form, [row[:n] for row in rows[1:]])
+        need(found is not None, "whether the set shrinks to a point is not decided")
         return x[:d], "dependent" if found else "vanishes"
-
-    @staticmethod
-    def negative(jacobian: list[list[arb]], rows: list[list[arb]], n: int) -> int:
-        """Return the number of negative eigenvalues of a Hessian along a face."""
-        form = [[*jacobian[i][:n], *(row[i] for row in rows)] for i in range(n)]
-        found = negatives(form + [[*row, *[ZERO] * len(rows)] for row in rows])
-        if found is None:
-            msg = "whether the set shrinks to a point is not decided"
-            raise NotShownError(msg)
-        return found - len(rows)
 
     def check_open(self, place: Sequence[arb], closed: Sequence[int]) -> None:
         """Check that all other functions are positive."""

@@ -1,4 +1,4 @@
-"""Regions with one KKT point, and loci, by Krawczyk's operator."""
+"""Regions with one point: of KKT equations, held to first order, or a common zero; and loci."""
 
 from typing import Any
 
@@ -7,13 +7,16 @@ from flint import arb, arb_mat
 from .balls import (
     BESIDE,
     ZERO,
+    column,
     definite,
     dot,
+    fitted,
     hull,
     moved,
     need,
     negatives,
     nothing,
+    number,
     shown,
     sides,
     turn,
@@ -24,6 +27,7 @@ from .problem import StoredProblem
 MOST_UNKNOWNS = 600  # of a point, with its multipliers
 MOST_ENTRIES = 10**7  # of the second derivatives by the coordinates of a point
 HALVINGS = 6  # of a region, in whose parts multipliers are enclosed
+NEAR = 2.0**-30  # reach of the box in which a point is sought that functions hold
 
 
 class StoredRegion:
@@ -162,11 +166,8 @@ class StoredRegion:
     def solved(self, slopes: list[list[arb]]) -> list[arb] | None:
         """Enclose the solutions of ``sum lam_i g_i = dE``; None if some may not be positive."""
         *rows, energy = slopes
-        middle = arb_mat(rows).mid()
         try:
-            left = (middle * middle.transpose()).inv().mid() * middle
-            form = left * arb_mat(rows).transpose()
-            found = form.solve(left * arb_mat([[x] for x in energy])).entries()
+            found = fitted(arb_mat(rows).transpose(), column(energy))
         except ZeroDivisionError:
             return None
         return found if all(x > 0 for x in found[: len(self.active)]) else None
@@ -236,3 +237,157 @@ class StoredRegion:
         if any(x < a or x > b for x, a, b in known):
             return False
         return True if all(a <= x <= b for x, a, b in known) else None
+
+
+class StoredPin(StoredRegion):
+    """A box without stationary points but one, at which the active functions vanish.
+
+    The set is one intersection without equations.  For ``i`` of the active functions, the energy
+    ``E`` and the coordinates ``j``, reach ``r_j``, let ``R_i`` bound half of ``|f_i''|`` over
+    displacements within the reach.  Weights ``mu >= 0`` with ``sum mu_i df_i = dE + s t e_j`` at
+    the point for all ``j`` and ``s = 1, -1``, ``df_i u > 0`` in the box, and
+    ``t r_j > sum mu_i R_i + 2 R_E + max(R_i / df_i u) dE u`` leave no other stationary point.
+    """
+
+    def __init__(self, p: StoredProblem, record: dict[str, Any]) -> None:
+        self.p, self.places, self.active = p, p.free, frozenset(record["active"])
+        self.name, n, corner = f"region of {record['active']}", len(p.free), {*record["corner"]}
+        plain = not p.k and not p.parameters
+        need(plain and len(p.branches) == 1, f"{self.name}: not of one intersection")
+        # A function that the set does not ask for may be negative in it, and hold nothing.
+        fine = corner <= self.active and all(self.active <= b for b in p.branches)
+        fine = fine and len(corner) == n
+        need(fine, f"{self.name}: the functions")
+        ends = sides(record, ("lower", "upper"), p.n)
+        self.lower, self.upper = ([side[i] for i in p.free] for side in ends)
+        sharp = sides(record, ("sharp_lower", "sharp_upper"), n + len(self.active))
+        self.rows = [*sorted(self.active), p.m]
+        self.limit()
+        self.rows = sorted(corner)
+        start = [x + arb(0, NEAR) * (1 + abs(x)) for x in hull(*sharp)[:n]]
+        point = zero(self.vanishing, start)
+        need(point, f"{self.name}: no single common zero is shown")
+        self.rows = [*sorted(self.active), p.m]
+        self.unknowns = [*(point or []), *self.shown(record, point or [])]
+        self.placed(sharp, record, 0, frozenset(corner))
+        need(self.active <= self.zeros, f"{self.name}: not all functions vanish")
+
+    def shown(self, record: dict[str, Any], point: list[arb]) -> list[arb]:
+        """Check the inequality; return positive multipliers."""
+        n, count = len(self.places), len(self.active)
+        box = hull(self.lower, self.upper)
+        here, there = self.rows_at(point), self.rows_at(box)
+        need(here and there, f"{self.name}: the functions are not smooth")
+        steps, into, weights = (
+            [arb(float.fromhex(x)) for x in record[name]] for name in ("steps", "into", "weights")
+        )
+        fine = len(steps) == 2 * n and len(into) == n and len(weights) == 2 * n * count
+        need(fine and all(t > 0 for t in steps), f"{self.name}: the numbers")
+        exact = self.exact(here[1], steps, arb_mat(2 * n, count, weights))
+        reach = [(x - y).abs_upper() for x, y in zip(box, point, strict=True)]
+        around = all(x.contains(y) for x, y in zip(box, point, strict=True))
+        need(around, f"{self.name}: the box is elsewhere")
+        pairs = [(i, j, a * b / 2) for i, a in enumerate(reach) for j, b in enumerate(reach)]
+        *bends, bend = [sum((h[i][j].abs_upper() * r for i, j, r in pairs), ZERO) for h in there[2]]
+        *grows, pull = [dot(g, into) for g in there[1]]
+        need(all(x > 0 for x in grows), f"{self.name}: no direction increases all functions")
+        most = pull.upper() if pull.upper() > 0 else ZERO
+        lost = [r / x * most for r, x in zip(bends, grows, strict=True)]
+        for k, (t, mu) in enumerate(zip(steps, exact, strict=True)):
+            kept = t * reach[k % n] - dot(mu, bends) - 2 * bend
+            need(all(x >= 0 for x in mu), f"{self.name}: a negative weight")
+            need(all(kept > x for x in lost), f"{self.name}: not held in all of the box")
+        total = [ZERO] * count
+        for j in range(n):
+            up, down = steps[j], steps[n + j]
+            both = zip(total, exact[j], exact[n + j], strict=True)
+            total = [m + (down * a + up * b) / ((up + down) * n) for m, a, b in both]
+        return total
+
+    def exact(self, slopes: list[list[arb]], steps: list[arb], weights: arb_mat) -> Any:
+        """Return the weights with which the gradients add up exactly."""
+        *rows, pull = slopes
+        n, g = len(pull), arb_mat(rows)
+        wanted = [list(pull) for _ in steps]
+        for k, t in enumerate(steps):
+            wanted[k][k % n] += t if k < n else -t
+        try:
+            change = (arb_mat(wanted) - weights * g) * (g.mid().transpose() * g).inv()
+        except ZeroDivisionError:
+            need(False, f"{self.name}: the gradients may be dependent")
+        return (weights + change * g.mid().transpose()).tolist()
+
+
+class StoredVertex(StoredRegion):
+    """A box in which functions have one common zero: by Krawczyk's operator, or by second order."""
+
+    def __init__(self, p: StoredProblem, record: dict[str, Any]) -> None:
+        self.p, self.places, self.active = p, p.free, frozenset(record["active"])
+        self.name = f"region {record}"
+        need(self.active <= set(range(p.m)), self.name)
+        self.rows = [*sorted(self.active), *range(p.m, p.m + p.k)]
+        self.limit()
+        ends = sides(record, ("lower", "upper"), p.n)
+        self.lower, self.upper = ([side[i] for i in p.free] for side in ends)
+        self.critical: frozenset[int] = frozenset()
+        if "exact" in record:
+            self.unknowns = self.tip(record)
+        else:
+            need(len(self.rows) == len(p.free), f"{self.name}: the number of functions")
+            self.unknowns = zero(self.vanishing, hull(self.lower, self.upper)) or []
+            need(self.unknowns or not p.free, f"{self.name}: no single common zero is shown")
+        sharp = sides(record, ("sharp_lower", "sharp_upper"), len(p.free))
+        signs = self.located(sharp, self.active)
+        around = zip(self.lower, self.upper, self.unknowns, strict=True)
+        need(all(a <= x <= b for a, b, x in around), self.name)
+        sets = p.open_sets(signs, self.zeros)
+        self.matter = frozenset().union(*sets)
+        self.listable = bool(sets) and self.active <= self.matter <= self.zeros
+        self.absent = not (self.active <= self.matter or self.critical & self.matter)
+        self.absent |= not sets
+
+    def tip(self, record: dict[str, Any]) -> list[arb]:
+        """Check that an exact point is the only common zero, by second order."""
+        p = self.p
+        point = [number(record["exact"][i]) for i in p.free]
+        fixed = (number(x).contains(p.anywhere[i]) for i, x in enumerate(record["exact"]))
+        need(all(i in p.free or same for i, same in enumerate(fixed)), self.name)
+        box = hull(self.lower, self.upper)
+        here, there = self.rows_at(point), self.rows_at(box)
+        need(here and there, f"{self.name}: the functions are not smooth")
+        (values, slopes, _), bends = here, there[2]
+        shares = [number(text) for text in record["combination"]]
+        weight, n = arb(float.fromhex(record["weight"])), range(len(point))
+        zeros = [*values, *(dot(shares, column) for column in zip(*slopes, strict=True))]
+        need(all(map(nothing, zeros)), f"{self.name}: no common zero with dependent gradients")
+        away = [x - c for x, c in zip(box, point, strict=True)]
+        factors = [x / 2 + weight * dot(g, away) / 2 for x, g in zip(shares, slopes, strict=True)]
+        columns = list(zip(*slopes, strict=True))
+        form = [
+            [
+                dot(factors, [h[i][j] for h in bends]) + weight * dot(columns[i], columns[j])
+                for j in n
+            ]
+            for i in n
+        ]
+        twice = [[form[i][j] + form[j][i] for j in n] for i in n]
+        need(definite(twice), f"{self.name}: the common zero is not isolated")
+        self.critical = frozenset(record["critical"])
+        need(self.critical <= self.active and (not p.k or not self.critical), self.name)
+        for i in self.critical:
+            place = self.rows.index(i)
+            zeros += slopes[place]
+            try:
+                arb_mat(bends[place]).inv()
+            except ZeroDivisionError:
+                need(False, f"{self.name}: a second derivative may be singular")
+        need(all(map(nothing, zeros)), f"{self.name}: a gradient does not vanish")
+        self.tested += sum(not shown(x) for x in zeros)
+        return point
+
+    def same(self, other: StoredRegion) -> bool | None:
+        """Whether the zero is that of another region; None where that is not decided."""
+        if other.active - self.zeros - self.unknown:
+            return False
+        inside = self.lies_in(other)
+        return inside if inside is False or (inside and other.active <= self.zeros) else None

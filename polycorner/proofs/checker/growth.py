@@ -49,7 +49,7 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .algebra import Algebra, constant
-from .balls import ZERO, definite, dot, need, square
+from .balls import ZERO, column, definite, dot, need, square
 from .rationals import decimal, ratio, ratios
 from .statement import PART, StoredStatement, largest, least, upper, zero_near
 
@@ -158,8 +158,8 @@ class StoredGrowth(StoredStatement):
         need(k < 1, "the gradients of the functions that support are not shown to span")
         t = k / (1 - k)
         lam = [*self.lam, *[ZERO] * len(self.gauges)]
-        slope = arb_mat([[x] for x in self.forms_there[-1][1]])
-        rest = (slope - across * arb_mat([[x] for x in lam])).entries()
+        slope = column(self.forms_there[-1][1])
+        rest = (slope - across * column(lam)).entries()
         most = largest(rest)
         moved = p * arb_mat([[x + PART * t * most] for x in rest])
         m = [x + y for x, y in zip(lam, moved.entries(), strict=True)]
@@ -212,8 +212,8 @@ class StoredGrowth(StoredStatement):
         """
         middle = arb_mat(form).mid()
         for w, row in zip(weights, rows, strict=True):
-            column = arb_mat([[x.mid()] for x in row])
-            middle += column * column.transpose() * w.mid()
+            normal = column([x.mid() for x in row])
+            middle += normal * normal.transpose() * w.mid()
         turn = inverse_root(middle.mid().tolist())
         if turn is None:
             return False
@@ -221,7 +221,7 @@ class StoredGrowth(StoredStatement):
         metric = t * t.transpose()
         bent = t * arb_mat(form) * t.transpose()
         for w, row in zip(weights, rows, strict=True):
-            along = (t * arb_mat([[x] for x in row])).entries()
+            along = (t * column(row)).entries()
             bent += arb_mat(
                 [[w * (square(x) if i == j else x * y) for j, y in enumerate(along)]
                  for i, x in enumerate(along)]

@@ -40,7 +40,7 @@ from typing import Any
 from flint import arb, arb_mat
 
 from .arcs import StoredArc, Watched
-from .balls import ZERO, NotShownError, dot, need, square
+from .balls import ZERO, NotShownError, column, dot, fitted, need, square
 from .curves import Equations, StoredFace, StoredFamily, Tube, solved
 from .statement import PART, zero_near
 
@@ -279,10 +279,7 @@ class StoredPitchfork:
                 form = arb_mat(
                     [[units[j] * rows[r][c] * units[c] for c in others] for j, r in places]
                 )
-                right = arb_mat([[-units[j] * rows[r][way]] for j, r in places])
-                middle = form.mid().transpose()
-                left = (middle * form.mid()).inv().mid() * middle
-                u = (left * form).solve(left * right).entries()
+                u = fitted(form, column([-units[j] * rows[r][way] for j, r in places]))
                 for c, x in zip(others, u, strict=True):
                     hull[c] = x * units[c]
             hull = [a.union(b) for a, b in zip(hull, self.arms, strict=True)]

@@ -8,9 +8,8 @@ from typing import Any
 
 from flint import arb, arb_mat
 
-from .balls import NAN, ZERO, different, dot, hull, moved, need, places, sides
-from .faces import StoredRegion
-from .pinned import StoredPin
+from .balls import NAN, ZERO, column, different, dot, hull, moved, need, places, sides
+from .faces import StoredPin, StoredRegion
 from .problem import StoredProblem
 from .symmetries import symmetries
 
@@ -150,8 +149,8 @@ class StoredProof:
             try:
                 left = (middle * middle.transpose()).inv().mid() * middle
                 form = left * gradients.transpose()
-                lam = form.solve(left * arb_mat([[x] for x in energy])).entries()
-                across = arb_mat([[x] for x in d])
+                lam = form.solve(left * column(energy)).entries()
+                across = column(d)
                 y = form.transpose().solve(-gradients * across)
             except ZeroDivisionError:
                 return False

@@ -7,7 +7,7 @@ from typing import Any
 from flint import arb, arb_mat, ctx, fmpq
 
 from .algebra import Algebra, constant
-from .balls import ZERO, NotShownError, dot, need, places, zero
+from .balls import ZERO, NotShownError, column, dot, krawczyk, need, places, zero
 from .problem import StoredProgram
 from .rationals import decimal, decimals, ratios
 
@@ -202,19 +202,15 @@ def zero_near(system: Any, start: Sequence[arb], around: Any = None) -> list[arb
 
 def image(system: Any, x: list[arb], box: list[arb]) -> list[arb]:
     """Return the displacements from ``x`` to which Krawczyk's operator maps those of a box."""
-    (values, middle), (_, jacobian) = system(x), system(box)
-    inverse = arb_mat(middle).mid().inv().mid()
-    away = arb_mat([[b - a] for a, b in zip(x, box, strict=True)])
-    defect = arb_mat(len(x), len(x), 1) - inverse * arb_mat(jacobian)
-    found = (defect * away - inverse * arb_mat([[y] for y in values])).entries()
+    found = krawczyk(system(x), system(box), [b - a for a, b in zip(x, box, strict=True)])
     need(all(y.is_finite() for y in found), "the equations are not finite")
-    return list(found)
+    return found
 
 
 def newton(system: Any, x: list[arb]) -> list[arb]:
     values, jacobian = system([a.mid() for a in x])
     try:
-        steps = arb_mat(jacobian).mid().inv().mid() * arb_mat([[y] for y in values])
+        steps = arb_mat(jacobian).mid().inv().mid() * column(values)
     except ZeroDivisionError:
         msg = "the equations are not shown to be independent"
         raise NotShownError(msg) from None

@@ -3,9 +3,8 @@
 from typing import Any
 
 from .balls import need
-from .cells import StoredCells
 from .growth import StoredGrowth
-from .minimum import StoredMinimum
+from .minimum import StoredCells, StoredMinimum
 
 KINDS = {
     "minimum between energies": StoredGrowth,

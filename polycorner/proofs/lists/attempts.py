@@ -26,6 +26,7 @@ from polycorner.proofs.lists.faces import (
 )
 from polycorner.proofs.lists.known import Setting, Tried
 from polycorner.proofs.lists.loci import locus, met
+from polycorner.proofs.lists.tree import Batch
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, SEARCH
 
@@ -84,12 +85,8 @@ def _regular(matrix: Array) -> NDArray[np.bool_]:
 class FacesOfPoints:
     """Rows of the functions that vanish on faces, one face for each point.
 
-    Attributes
-    ----------
-    rows : (B, k) array of int
-        The active inequalities, filled up to the most that a face has, then the equations.
-    filled : (B, k) array of bool
-        Which of them only fill up.
+    ``rows`` ``(B, k)`` are the active inequalities, filled up to the most that a face has, then the
+    equations; ``filled`` says which of them only fill up.
     """
 
     rows: NDArray[np.intp]
@@ -192,12 +189,7 @@ def newton(
 def active_sets(weights: Array, pulls: Array) -> Mask:
     """Return the functions ``(B, m)`` that balance the energy in nearest combinations.
 
-    Parameters
-    ----------
-    weights : (B, m + 1) array
-        Weights of the gradients, the energy's last.
-    pulls : (B, m + 1) array
-        Lengths of the gradients.
+    From the weights and the lengths of the gradients, ``(B, m + 1)`` each, the energy's last.
     """
     forces = weights * pulls
     most = forces.max(axis=1, keepdims=True, initial=0.0)
@@ -208,14 +200,7 @@ def active_sets(weights: Array, pulls: Array) -> Mask:
 
 @dataclass
 class Screen:
-    """KKT points of one face, approximately, about which boxes are tried.
-
-    Attributes
-    ----------
-    setting : Setting
-    active : tuple of int
-    q : (B, n) array
-    """
+    """KKT points of one face, approximately, about which boxes are tried."""
 
     setting: Setting
     active: Sequence[int]
@@ -319,7 +304,7 @@ class Screen:
 
 
 @dataclass
-class Starts:
+class Starts(Batch):
     """Points to start from.
 
     With the functions that seem active there, the widest regions to try, and whether the energy's
@@ -330,20 +315,6 @@ class Starts:
     active: Mask
     widest: Array
     still: Mask
-
-    def part(self, keep: NDArray[np.intp]) -> "Starts":
-        """Return some of them."""
-        return Starts(self.q[keep], self.active[keep], self.widest[keep], self.still[keep])
-
-    @classmethod
-    def joined(cls, parts: "Sequence[Starts]") -> "Starts":
-        """Return some starts, one or more, together."""
-        return cls(
-            np.concatenate([p.q for p in parts]),
-            np.concatenate([p.active for p in parts]),
-            np.concatenate([p.widest for p in parts]),
-            np.concatenate([p.still for p in parts]),
-        )
 
 
 @dataclass

@@ -8,21 +8,17 @@ are zero, at a point that it recognises or as combinations of the functions that
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, between, precision
+from polycorner.intervals.balls import Ball, ball, between, precision
 from polycorner.intervals.tapes import Box
 from polycorner.proofs.exact import MOST_CONSTANTS, ExactPoint, implied, in_ideal, number_in
+from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.faces import BITS, EnclosedFaces, outward
 from polycorner.proofs.polynomials import Polynomial
 from polycorner.proofs.symbols import Symbols, constants, evaluate
 from polycorner.spaces.manifold import Array
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-    from polycorner.proofs.lists.branches import Mask
 
 NEGATIVE, ZERO, POSITIVE, OPEN = -1, 0, 1, 2
 REACH = 2.0**-40  # of the box in which coordinates that are not recognised are sought
@@ -131,18 +127,12 @@ def _within(x: "Ball", lower: float, upper: float) -> bool:
     return bool(between(lower, upper).contains(x))
 
 
-def active_at(conj: "Mask", found: Sequence[int]) -> tuple[int, ...] | None:
+def active_at(conj: Mask, found: Sequence[int]) -> tuple[int, ...] | None:
     """Return the functions that vanish at a point and matter for the set near it.
 
     The set is near the point a union of pieces, where functions that vanish are not negative; a
-    piece inside another does not matter.  None outside the set.
-
-    Parameters
-    ----------
-    conj : (c, m) array
-        The set as a union of intersections.
-    found : sequence of int
-        Signs, all of them decided.
+    piece inside another does not matter.  None outside the set.  ``conj`` is the set as a union of
+    intersections ``(c, m)``; all signs are decided.
     """
     at = np.array(found)
     pieces = [

@@ -196,12 +196,8 @@ def _combinations(middle: Array, reach: Array) -> Array:
 class Levels:
     """What is shown of a batch of boxes.
 
-    Attributes
-    ----------
-    left : (B,) array of bool
-        Boxes in which there may be other corners.
-    largest : list of (tuple of int, array of int)
-        Sets of ``N - k`` functions that may vanish together, and the boxes.
+    ``left`` are the boxes in which there may be other corners, ``largest`` the sets of ``N - k``
+    functions that may vanish together, and their boxes.
     """
 
     left: Truths
@@ -290,12 +286,9 @@ def _larger(alive: dict[Rows, Truths], masks: Mask) -> Iterator[tuple[Rows, Trut
 class Chunk(Treated):
     """Boxes, and the sets of functions that may vanish in those that are left.
 
-    Attributes
-    ----------
-    regular : list of (tuple of int, array of int)
-        Sets of functions that may have a common zero in some boxes, where they are independent.
-    singular : list of (int, list of int)
-        Boxes in which no such set is, and the functions that may vanish there.
+    ``regular`` are sets of functions that may have a common zero in some boxes, where they are
+    independent; ``singular`` are boxes in which no such set is, and the functions that may vanish
+    there.
     """
 
     regular: list[tuple[Rows, Places]] = field(default_factory=list)
@@ -306,10 +299,7 @@ class Chunk(Treated):
 class CornerSearch(BoxSearch):
     """One run: what is to be treated, and the regions in which one corner may be.
 
-    Attributes
-    ----------
-    relations : mapping from tuple of int to Relation or None
-        Linear relations between functions, by the sets in which they were sought.
+    ``relations`` are linear ones between functions, by the sets in which they were sought.
     """
 
     relations: dict[Rows, Relation | None] = field(default_factory=dict)

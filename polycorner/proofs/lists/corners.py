@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from polycorner import checks
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -48,22 +47,9 @@ def proved_skeleton(
 ) -> Skeleton:
     """Return the skeleton found from corners, and whether its corners are proved to be all.
 
-    Parameters
-    ----------
-    polyhedron : Polyhedron
-    points : sequence of (n,) arrays
-        The corners of a list.
-    symmetry : Symmetry
-        Symmetry to divide by.
-    complete : bool
-        Whether the list is complete.
-    starts : sequence of (n,) arrays, optional
-        Points of the set from which the search sets out as well.
-    tolerance : float, optional
-        Distance, in scale units, up to which a function counts as zero; corners of either side are
-        compared with what belongs to it.
-    options
-        Of :func:`polycorner.skeleton`.
+    ``points`` are the corners of a list, which may be complete; the search sets out from
+    ``starts``, points of the set, as well.  A function counts as zero up to ``tolerance``, in scale
+    units, and corners of either side are compared with what belongs to it.
     """
     rows = [*points, *(np.asarray(q, dtype=float) for q in starts)]
     around = np.reshape(rows, (-1, polyhedron.manifold.size))
@@ -211,12 +197,8 @@ class CornerList(ProvedList[CornerPoint]):
 class Candidate(RegionPoint):
     """A point that may be a corner.
 
-    Attributes
-    ----------
-    number : int
-        Of its region in the search.
-    active : tuple of int or None
-        Those that vanish and matter; None where that is not decided.
+    ``number`` is that of its region in the search; ``active`` are the functions that vanish and
+    matter, None where that is not decided.
     """
 
     number: int
@@ -290,6 +272,7 @@ def with_images(
         orbit += 1
 
 
+@checked
 def corners(
     polyhedron: Polyhedron,
     *,
@@ -347,7 +330,6 @@ def corners(
     """
     import sympy
 
-    checks.instance("polyhedron", polyhedron, Polyhedron)
     nothing = sympy.Integer(0)
     search = begun(CornerSearch, polyhedron, nothing, box, symmetry, resolution)
     limits = Limits(max_boxes, max_seconds, workers, progress)

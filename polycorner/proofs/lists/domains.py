@@ -21,13 +21,8 @@ ROUNDING = 10 * DEFAULT.rounding  # of boxes that are carried around circles, in
 class Domain(Value):
     """A box of configurations, closed.
 
-    Attributes
-    ----------
-    manifold : Manifold
-    lower, upper : (n,) arrays
-        Its sides; equal for coordinates that are fixed.
-    parameters : tuple of int
-        Positions of parameters: what is shown is shown for each of their values.
+    Sides are equal for coordinates that are fixed.  What is shown is shown for each value of the
+    parameters, which are given by their positions.
     """
 
     manifold: Manifold

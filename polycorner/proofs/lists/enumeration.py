@@ -100,13 +100,8 @@ def _extended(symmetry: Symmetry | None, n: int, count: int) -> Symmetry | None:
 def unreached(formulas: Formulas, domain: Domain, fields: Sequence[object]) -> list[int]:
     """Return the fixed coordinates whose values not every orbit is shown to reach.
 
-    Parameters
-    ----------
-    formulas : Formulas
-        All functions of the problem.
-    domain : Domain
-    fields : sequence of vector fields
-        Declared symmetries; translations are found without being declared.
+    ``formulas`` are all functions of the problem, ``fields`` the declared symmetries; translations
+    are found without being declared.
     """
     left = list(domain.fixed)
     if not left:
@@ -249,7 +244,6 @@ def stationary_points(
     >>> found.complete, len(found.minima)
     (True, 4)
     """
-    checks.instance("minima_only", minima_only, bool)
     question = _asked(polyhedron, energy, box, symmetry, resolution, parameters)
     branches = pieces(question.problem.polyhedron)
     several = len(branches.parts) > 1
@@ -289,9 +283,6 @@ class Limits:
         checks.whole("max_boxes", self.max_boxes, least=1)
         checks.whole("workers", self.workers, least=1)
         checks.real("max_seconds", self.max_seconds, above=0, infinite=True)
-        if not callable(self.progress):
-            expected = "a function (done, total, note)"
-            checks.refuse("progress", expected, self.progress, TypeError)
 
     def run(self, search: BoxSearch, kept: SearchStore | None = None) -> None:
         """Run a search to its end, saving it by the clock."""
@@ -343,8 +334,6 @@ def _asked(
     value = float(problem.energy.value((found.lower + found.upper) / 2))
     if abs(value) > 2.0**LARGEST:
         checks.refuse("energy", f"values up to 2^{LARGEST:g}, which are enclosed", value)
-    if symmetry is not None:
-        checks.instance("symmetry", symmetry, Symmetry)
     sides = check_parameters(problem, parameters)[0]
     if sides:
         problem, found, symmetry = with_parameters(problem, found, symmetry, sides)

@@ -24,13 +24,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from polycorner.intervals.balls import (
+    Ball,
     ball,
     between,
     column,
     entries,
     exact,
+    left_inverse,
     matrix,
     middle_inverse,
+    middles,
     narrower,
     precision,
 )
@@ -42,8 +45,6 @@ from polycorner.tolerances import SEARCH
 from polycorner.values import Value
 
 if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
-
     Equations = tuple[list[Ball], list[list[Ball]]]  # residual and Jacobian
 
 BITS = 128
@@ -337,7 +338,7 @@ def inertia(rows: "list[list[Ball]]") -> tuple[int, int] | None:
     """Return the numbers of negative and positive eigenvalues of a symmetric matrix of balls."""
     if not rows:  # nothing may move
         return 0, 0
-    middle = np.array([[float(x.mid()) for x in row] for row in rows])
+    middle = middles(rows)
     if not np.isfinite(middle).all():
         return None
     # Congruence by any regular matrix keeps the inertia, so that this one may be rounded.
@@ -369,15 +370,14 @@ def enclosed_multipliers(slopes: "list[list[Ball]]") -> "list[Ball] | None":
     count = len(slopes) - 1
     if not count:
         return []
-    middle = np.array([[float(x.mid()) for x in row] for row in slopes[:-1]])
-    if not np.isfinite(middle).all():
+    across = list(zip(*slopes[:-1], strict=True))
+    left = left_inverse(across)
+    if left is None:
         return None
     try:
-        # Preconditioned by an approximate left inverse: the system is square and near the identity.
-        left = matrix(np.linalg.pinv(middle.T).tolist())
-        square = left * matrix(slopes[:-1]).transpose()
-        return entries(square.solve(left * column(slopes[-1])))
-    except (ZeroDivisionError, np.linalg.LinAlgError):
+        # Preconditioned: the system is square and near the identity.
+        return entries((left * matrix(across)).solve(left * column(slopes[-1])))
+    except ZeroDivisionError:
         return None
 
 

@@ -33,13 +33,7 @@ MOST_ELEMENTS = 4096
 class Motion:
     """A symmetry ``q -> signs * q[order] + turns * periods``.
 
-    Attributes
-    ----------
-    order : tuple of int
-    signs : tuple of int
-        1 or -1.
-    halves : tuple of int
-        Half periods that are added: 0 or 1; 0 on lines.
+    ``signs`` are 1 or -1; ``halves`` are half periods that are added, 0 or 1, and 0 on lines.
     """
 
     order: tuple[int, ...]

@@ -97,12 +97,7 @@ class Tried:
 class Known:
     """Regions and loci, in the order in which they were found.
 
-    Parameters
-    ----------
-    dimension, inequalities : int
-        ``n`` and ``m``.
-    parameters : tuple of int
-        Positions of parameters, which have the same sides in all boxes and regions.
+    Positions of ``parameters`` are given, as these have the same sides in all boxes and regions.
     """
 
     def __init__(self, dimension: int, inequalities: int, parameters: tuple[int, ...] = ()) -> None:

@@ -126,9 +126,7 @@ def loci_of(search: BoxSearch) -> list[LocusRegion]:
 
 def _is_held(domain: Domain, place: LocusRegion) -> bool:
     """Whether a locus is in the domain for all values of the parameters, but for rounding."""
-    lower, upper, z = domain.lower.copy(), domain.upper.copy(), list(place.z)
-    lower[z], upper[z] = place.sharp_lower, place.sharp_upper
-    return domain.holds(lower, upper, ROUNDING)
+    return domain.holds(*place.sides(domain), ROUNDING)
 
 
 def _locus_image(search: BoxSearch, place: LocusRegion, g: Motion) -> LocusRegion:
@@ -193,14 +191,8 @@ class _Searched:
         domain = self.search.domain
         boxes = [full(self.search, member.region) for member in self.members]
         boxes += [(box[0], box[1]) for box in undecided(self.search)]
-        boxes += [self.sides(place) for place in self.loci]
+        boxes += [place.sides(domain) for place in self.loci]
         return all(domain.apart(lower, upper, *box) for box in boxes)
-
-    def sides(self, place: LocusRegion) -> tuple[Array, Array]:
-        """Return the sides of a locus in all coordinates."""
-        lower, upper = self.search.domain.lower.copy(), self.search.domain.upper.copy()
-        lower[list(place.z)], upper[list(place.z)] = place.sharp_lower, place.sharp_upper
-        return lower, upper
 
 
 def united(
@@ -224,7 +216,7 @@ def united(
                 point = point_of(piece.search, member, len(to))
                 to.append(point if minimum else replace(point, index=None))
         for place in piece.loci:
-            sides = piece.sides(place)
+            sides = place.sides(piece.search.domain)
             if all(p.place(*sides, frozenset()) == OUT for p in every if p is not piece):
                 loci.append(locus_of(piece.search, place))
             else:

@@ -34,6 +34,7 @@ from polycorner.proofs.kkt import krawczyk, strictly_inside
 from polycorner.proofs.lists.branches import Mask
 from polycorner.proofs.lists.domains import Domain
 from polycorner.proofs.lists.faces import BITS, QUARTERINGS, enclosing, inertia, outward
+from polycorner.proofs.lists.tree import bisected
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH
 from polycorner.values import Value
@@ -67,6 +68,12 @@ class LocusRegion(Value):
     sharp_upper: Array
     index: int
     sample: Array | None = None
+
+    def sides(self, domain: Domain) -> tuple[Array, Array]:
+        """Return its sharp sides, in all coordinates of a domain."""
+        sides = np.array([domain.lower, domain.upper])
+        sides[:, list(self.z)] = self.sharp_lower, self.sharp_upper
+        return sides[0], sides[1]
 
 
 def read_coordinates(formulas: Formulas, free: tuple[int, ...]) -> tuple[int, ...]:
@@ -173,10 +180,7 @@ def met(
         bounds = functions.values(lower, upper)[1][:, : conj.shape[1]]
         missed = np.any((bounds < 0)[:, None, :] & conj, axis=2)
         left = ~np.all(missed, axis=1)
-        lower, upper, middle = lower[left], upper[left], middle[left]
-        each = np.arange(len(lower))
-        axis = along[((upper - lower) / domain.manifold.scale_array)[:, along].argmax(axis=1)]
-        first, second = upper.copy(), lower.copy()
-        first[each, axis] = second[each, axis] = middle[each, axis]
-        lower, upper = np.concatenate([lower, second]), np.concatenate([first, upper])
+        lower, upper = lower[left], upper[left]
+        axes = along[((upper - lower) / domain.manifold.scale_array)[:, along].argmax(axis=1)]
+        lower, upper = bisected(lower, upper, axes)
     return None

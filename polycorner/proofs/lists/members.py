@@ -23,11 +23,7 @@ IN, OUT, OPEN = "in", "out", "open"
 class RegionPoint:
     """The point of a region.
 
-    Attributes
-    ----------
-    region : Region
-    zeros, unknown : frozenset of int
-        Inequalities that vanish there, and those that may.
+    Inequalities are ``zeros`` if they vanish there, and ``unknown`` if they may.
     """
 
     region: Region
@@ -39,12 +35,8 @@ class RegionPoint:
 class Member(RegionPoint):
     """A point that may be stationary.
 
-    Attributes
-    ----------
-    place : str
-        Whether it is stationary in the set (``IN``), or not (``OUT``), or that is ``OPEN``.
-    free : bool
-        Whether in some branch that contains it all functions but those of the region are positive.
+    It is stationary in the set (``IN``), or not (``OUT``), or that is ``OPEN``; it is ``free`` if
+    in some branch that contains it all functions but those of the region are positive.
     """
 
     place: str

@@ -33,11 +33,11 @@ equations for ``s`` and ``-s`` give ``(t + t') tau r_j <= tau sum (mu_i + mu'_i)
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, column, dot, entries, matrix, precision
+from polycorner.intervals.balls import Ball, ball, column, dot, entries, matrix, middles, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.polyhedra.cones import independent_rows
@@ -45,9 +45,6 @@ from polycorner.proofs.lists.coincidences import ZERO, Place, signs
 from polycorner.proofs.lists.faces import BITS, EnclosedFaces, Region, enclosing, outward
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT, SEARCH
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 SHRINKINGS = 8  # of a box
 LEAST_SHARE, MOST_SHARE = 0.25, 0.9  # of a box that the next one reaches
@@ -82,16 +79,9 @@ class Pinned(Region):
 def pinned(faces: EnclosedFaces, q: Array, slopes: Array, widest: float) -> Pinned | None:
     """Return the widest box tried about a point at which some functions vanish, or None.
 
-    Parameters
-    ----------
-    faces : EnclosedFaces
-    q : (n,) array
-        The point, approximately.
-    slopes : (m, n) array
-        Scaled gradients of the functions there, in the free coordinates; 0 of those that do not
-        vanish.
-    widest : float
-        Largest reach of the box, in scale units.
+    ``slopes`` are the scaled gradients of the functions at the point, nearly, in the free
+    coordinates, 0 of those that do not vanish, ``(m, n)``; ``widest`` is the largest reach of the
+    box, in scale units.
     """
     corner = _independent(slopes)
     if corner is None:
@@ -132,8 +122,8 @@ def _within(
     if isinstance(forms, Undecided):
         return None
     slopes = [[g[i] for i in free] for g in forms.evaluate(Box(point), 1)[1]]
-    middles = np.array([[float(x.mid()) for x in g] for g in slopes])
-    guess = _guessed(middles, faces.scales[free]) if np.isfinite(middles).all() else None
+    known = middles(slopes)
+    guess = _guessed(known, faces.scales[free]) if np.isfinite(known).all() else None
     if guess is None:
         return None
     steps, weights = guess
@@ -141,7 +131,7 @@ def _within(
     exact = _corrected(slopes, steps, weights)
     if exact is None:
         return None
-    middle, radii = np.array([float(x.mid()) for x in point]), np.zeros_like(faces.scales)
+    middle, radii = middles(point), np.zeros_like(faces.scales)
     radii[free] = min(widest, SEARCH.widest) * faces.scales[free]
     for _ in range(SHRINKINGS):
         lower, upper = middle - radii, middle + radii

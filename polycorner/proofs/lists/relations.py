@@ -13,10 +13,11 @@ whole faces.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.groups import AllOf, AnyOf
 from polycorner.polyhedra.polyhedron import Polyhedron
@@ -24,9 +25,6 @@ from polycorner.proofs.lists.branches import conjunctions
 from polycorner.proofs.lists.images import expanded
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Value
-
-if TYPE_CHECKING:
-    from polycorner.formulas.functions import SmoothFunction
 
 MORE = 6  # points at which values are compared, beyond the number of functions
 MOST_DENOMINATOR = 10_000
@@ -38,12 +36,7 @@ Literal = tuple[int, int]  # a function, equations after inequalities, and a sig
 class Relation(Value):
     """Weights with which inequalities and equations add up to nothing.
 
-    Attributes
-    ----------
-    rows : tuple of int
-        Inequalities, all with weights that are not 0.
-    weights : tuple of Fraction
-        Theirs, then those of the equations.
+    No weight of an inequality is 0; those of the equations come last.
     """
 
     rows: tuple[int, ...]
@@ -90,12 +83,8 @@ def relation(problem: Problem, rows: Sequence[int]) -> Relation | None:
 class Pieces:
     """A set as a union of polyhedra, in none of which functions are multiples of each other.
 
-    Attributes
-    ----------
-    parts : tuple of Polyhedron
-        Branches with the same equations are one part.
-    alike : mapping from str to str
-        The name of the function of which each one is a multiple, by name.
+    Branches with the same equations are one part; ``alike`` has the name of the function of which
+    each one is a multiple, by name.
     """
 
     parts: tuple[Polyhedron, ...]
@@ -198,7 +187,7 @@ def _literals(polyhedron: Polyhedron) -> list[Literal]:
     return [found.get(j, (j, 1)) for j in range(len(functions))]
 
 
-def _multiple(f: "SmoothFunction", g: "SmoothFunction") -> int:
+def _multiple(f: SmoothFunction, g: SmoothFunction) -> int:
     """Return the sign of ``c`` if expanded formulas show that ``f = c g``, and 0 if not."""
     import sympy
 

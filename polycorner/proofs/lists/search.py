@@ -33,7 +33,7 @@ from polycorner.proofs.lists.faces import Region
 from polycorner.proofs.lists.known import Setting
 from polycorner.proofs.lists.loci import LocusRegion
 from polycorner.proofs.lists.redundancy import close_redundant, pin
-from polycorner.proofs.lists.tree import Boxes, Tree, joined
+from polycorner.proofs.lists.tree import Boxes, Tree, bisected
 from polycorner.spaces.manifold import Array
 
 CHUNKS = 8  # that a round consists of
@@ -158,7 +158,7 @@ class BoxSearch(Setting, ABC):
         found = self.treat(chunks, mapped)
         taken = sum(map(len, chunks))
         before = self.waiting.part(slice(None, len(self.waiting) - taken))
-        self.waiting = joined([before, *map(self._finish, found)])
+        self.waiting = Boxes.joined([before, *map(self._finish, found)])
 
     def _chunks(self) -> list[Boxes]:
         """Return the last boxes that wait, in chunks of a size that the problem determines."""
@@ -187,7 +187,7 @@ class BoxSearch(Setting, ABC):
         rest, inner = t.boxes.part(t.left), t.inner[:, t.left]
         # Small boxes wait for the sharper tests, if these were not used.
         again = self._small(rest) & (not self.sharp)
-        return joined([self._halves(rest.part(~again), inner[:, ~again]), rest.part(again)])
+        return Boxes.joined([self._halves(rest.part(~again), inner[:, ~again]), rest.part(again)])
 
     def _relative(self, boxes: Boxes) -> Array:
         """Return the sides of boxes in the units of the domain."""
@@ -210,15 +210,10 @@ class BoxSearch(Setting, ABC):
         self.tally.split += len(boxes)
         # Sides in scale units: a coordinate that is measured in small units is not preferred.
         axis = self._relative(boxes).argmax(axis=1)
-        each = np.arange(len(boxes))
-        middle = boxes.middles[each, axis]
-        first, second = boxes.upper.copy(), boxes.lower.copy()
-        first[each, axis] = middle
-        second[each, axis] = middle
+        middle = boxes.middles[np.arange(len(boxes)), axis]
         nodes, since = self.tree.split(boxes.nodes, axis, middle), boxes.since + 1
-        return Boxes(boxes.lower, first, nodes, since).with_others(
-            Boxes(second, boxes.upper, nodes + 1, since)
-        )
+        halves = bisected(boxes.lower, boxes.upper, axis)
+        return Boxes(*halves, np.concatenate([nodes, nodes + 1]), np.tile(since, 2))
 
     def _cut(self, boxes: Boxes, inner: Array) -> Boxes:
         """Cut off and close what lies beyond narrower sides, where that is worth a cut.

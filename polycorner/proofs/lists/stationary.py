@@ -1,9 +1,11 @@
 """Lists of all stationary points of an energy on a polyhedron in a box, and what is proved."""
 
+import os
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic, TypeVar
+from pathlib import Path
+from typing import Generic, TypeVar
 
 from polycorner.kinds import checked
 from polycorner.minimisation import Certificate, certify
@@ -17,10 +19,6 @@ from polycorner.proofs.parameter_boxes import Interval, shown_box
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE
 from polycorner.values import Checked
-
-if TYPE_CHECKING:
-    import os
-    from pathlib import Path
 
 Bounds = tuple[float, float]
 P = TypeVar("P", bound="EnclosedPoint")
@@ -131,7 +129,7 @@ class ProvedList(Printed, Checked, Generic[P]):
         return f"{type(self).__name__}({self.statement})"
 
     @checked
-    def save(self, path: "str | os.PathLike[str]") -> "Path":
+    def save(self, path: str | os.PathLike[str]) -> Path:
         """Save the list and its proof, for an independent checker; return the path.
 
         See :mod:`polycorner.proofs.checker`.

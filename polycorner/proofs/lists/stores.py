@@ -44,7 +44,7 @@ from polycorner.proofs.lists.records import (
     region_from,
 )
 from polycorner.proofs.lists.search import BoxSearch, Tally
-from polycorner.proofs.lists.tree import DIRECTED, SPLIT, Boxes, Tree, joined
+from polycorner.proofs.lists.tree import DIRECTED, SPLIT, Boxes, Tree
 
 FORMAT = ["polycorner-search-of-stationary-points", 1]
 ROOT = "search.json"
@@ -219,7 +219,7 @@ class SearchStore:
         """Save the search as it is between two rounds."""
         search, before = self.search, set(self._files)
         waiting = _arrays(search.waiting, "waiting") | _arrays(
-            joined([search.waiting.part(slice(0)), *search.undecided]), "undecided"
+            Boxes.joined([search.waiting.part(slice(0)), *search.undecided]), "undecided"
         )
         pieces = [name for name in self._files if name.startswith("tree")]
         files = {name: self._files[name] for name in pieces}

@@ -20,11 +20,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from polycorner.intervals.balls import ball, dot, precision
+from polycorner.intervals.balls import Ball, ball, balls, dot, middles, precision
 from polycorner.intervals.enclosures import SmoothForms, Undecided
 from polycorner.intervals.tapes import Box
 from polycorner.proofs import polynomials as algebra
@@ -33,9 +33,6 @@ from polycorner.proofs.lists.faces import BITS, EnclosedFaces, Region, enclosing
 from polycorner.proofs.symbols import Symbols, evaluate
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH
-
-if TYPE_CHECKING:
-    from polycorner.intervals.balls import Ball
 
 DENOMINATORS = (1, 12, 1000, 10**6)
 FACTORS = (1.0, 4.0, 16.0, 64.0)  # of the least w that may do, by the sizes of the terms of Q
@@ -69,14 +66,8 @@ class TipRegion(Region):
 def tips(faces: EnclosedFaces, q: Array, open_: Sequence[int], reach: float) -> Iterator[TipRegion]:
     """Yield boxes about a singular corner near ``q``, for each set of functions that isolates it.
 
-    Parameters
-    ----------
-    faces : EnclosedFaces
-    q : (n,) array
-    open_ : sequence of int
-        Inequalities that may vanish there.
-    reach : float
-        How far the corner may be, in scale units.
+    ``open_`` are the inequalities that may vanish there, ``reach`` is how far the corner may be, in
+    scale units.
     """
     with precision(BITS):
         # An exact point must be guessed: an enclosure never shows that gradients are dependent.
@@ -109,12 +100,12 @@ def _approximate(faces: EnclosedFaces, q: Array, open_: Sequence[int]) -> Array 
     free, rows = list(faces.free), faces.rows(open_)
     q = q.copy()
     for _ in range(MOST_STEPS):
-        forms = faces.formulas.smooth(Box([ball(x) for x in q.tolist()]), rows)
+        forms = faces.formulas.smooth(Box(balls(q)), rows)
         if isinstance(forms, Undecided):
             return None
-        values, gradients = forms.evaluate(Box([ball(x) for x in q.tolist()]), 1)
+        values, gradients = forms.evaluate(Box(balls(q)), 1)
         slopes = np.array([[float(g[i].mid()) for i in free] for g in gradients])
-        missed = np.array([float(x.mid()) for x in values])
+        missed = middles(values)
         if not (np.isfinite(slopes).all() and np.isfinite(missed).all()):
             return None
         # Dependent gradients: convergence is linear, and least squares takes the shortest step.

@@ -5,7 +5,7 @@ Nodes are numbered as they are made, the two halves of a box one after the other
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,21 @@ SPLIT = ("nodes", "axes", "positions", "first")  # columns of the records of spl
 DIRECTED = ("owners", "vectors")  # columns of the directions of closed boxes
 
 
+class Batch:
+    """Arrays with a row for each of several things."""
+
+    def part(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Self:
+        """Return some of them."""
+        return type(self)(*(array[keep] for array in vars(self).values()))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return several batches, one or more, as one."""
+        return cls(*map(np.concatenate, zip(*(vars(p).values() for p in parts), strict=True)))
+
+
 @dataclass
-class Boxes:
+class Boxes(Batch):
     """Boxes that wait, ``(B, n)`` each.
 
     With their numbers in the tree, and the bisections since a candidate was tried there.
@@ -32,28 +45,18 @@ class Boxes:
     def __len__(self) -> int:
         return len(self.lower)
 
-    def part(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> "Boxes":
-        """Return some of them."""
-        return Boxes(self.lower[keep], self.upper[keep], self.nodes[keep], self.since[keep])
-
-    def with_others(self, *others: "Boxes") -> "Boxes":
-        """Return these and others."""
-        return joined([self, *others])
-
     @property
     def middles(self) -> Array:
         """Their middles, ``(B, n)``."""
         return 0.5 * (self.lower + self.upper)
 
 
-def joined(parts: Sequence[Boxes]) -> Boxes:
-    """Return several collections as one."""
-    return Boxes(
-        np.concatenate([p.lower for p in parts]),
-        np.concatenate([p.upper for p in parts]),
-        np.concatenate([p.nodes for p in parts]),
-        np.concatenate([p.since for p in parts]),
-    )
+def bisected(lower: Array, upper: Array, axes: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Return the halves of boxes along an axis each: all first halves, then all second ones."""
+    each = np.arange(len(lower))
+    first, second = upper.copy(), lower.copy()
+    first[each, axes] = second[each, axes] = (0.5 * (lower + upper))[each, axes]
+    return np.concatenate([lower, second]), np.concatenate([first, upper])
 
 
 @dataclass

@@ -4,16 +4,14 @@ Each field of a file is changed in turn, everything else being as it was.
 """
 
 import contextlib
-import copy
 import json
 import re
 import struct
-import zipfile
 
 import numpy as np
 import pytest
 import sympy as sp
-from proof_files import changed, verdict
+from proof_files import changed, described, parts_of, verdict, with_value, write
 from stored_problems import solved
 
 from polycorner import AnyOf, Manifold, Polyhedron, SmoothFunction
@@ -72,18 +70,6 @@ def files(tmp_path_factory):
     return file
 
 
-def parts_of(path):
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
-
-
-def write(path, parts):
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in parts.items():
-            archive.writestr(name, content)
-    return path
-
-
 def fields(data, path=()):
     """Yield the places of values in nested lists and dictionaries, with these.
 
@@ -118,17 +104,6 @@ def forgeries(value):
         others = [-x, 2 * x, x + 1, 0.0, x * (1 + 2.0**-40), np.inf]
         return [*(float(y).hex() for y in others), "", value + " ", None, 0]
     return ["", "-1", "0", "2", "x", "sin", "cos", "add", "sub", f"{value} ", value[::-1], None, 0]
-
-
-def with_value(data, path, value):
-    if not path:
-        return value
-    forged = copy.deepcopy(data)
-    place = forged
-    for key in path[:-1]:
-        place = place[key]
-    place[path[-1]] = value
-    return forged
 
 
 PROBLEM = (
@@ -247,7 +222,7 @@ def tall(side):
 
 def test_a_point_beside_the_box_is_not_listed(tmp_path):
     """The region with its point at ``x = 1`` is put into the proof for ``x < 1/2``."""
-    region = json.loads(parts_of(tall(2.0).save(tmp_path / "more.zip"))["problem.json"])["regions"]
+    region = described(tall(2.0).save(tmp_path / "more.zip"))["regions"]
     assert len(region) == 1
     region[0]["sharp_lower"][0] = (0.25).hex()
 

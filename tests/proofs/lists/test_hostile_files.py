@@ -11,7 +11,7 @@ import zipfile
 
 import pytest
 import sympy as sp
-from proof_files import verdict
+from proof_files import parts_of, verdict
 
 from polycorner import Manifold, Polyhedron
 from polycorner.proofs import stationary_points
@@ -28,8 +28,7 @@ def good(tmp_path_factory):
     found = stationary_points(disc, x**2 - y**2 + sp.Rational(1, 3) * y, box=[(-2, 2), (-2, 2)])
     path = found.save(tmp_path_factory.mktemp("hostile") / "list.zip")
     assert verdict(path)[0]
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
+    return parts_of(path)
 
 
 def packed(parts, method=zipfile.ZIP_DEFLATED):

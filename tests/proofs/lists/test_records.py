@@ -2,11 +2,11 @@
 
 import json
 import math
-import zipfile
 
 import numpy as np
 import pytest
 import sympy as sp
+from proof_files import parts_of
 
 from polycorner import AnyOf, Manifold, Polyhedron
 from polycorner.formulas.functions import SmoothFunction
@@ -31,10 +31,7 @@ def found():
 
 @pytest.fixture(scope="module")
 def parts(found, tmp_path_factory):
-    path = tmp_path_factory.mktemp("files") / "list.zip"
-    found.save(path)
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
+    return parts_of(found.save(tmp_path_factory.mktemp("files") / "list.zip"))
 
 
 def test_the_problem_is_stated_with_exact_numbers(parts):

@@ -1,11 +1,9 @@
 """Searches: the same list however many threads work, and every stationary point of a lattice."""
 
-import json
-import zipfile
-
 import numpy as np
 import pytest
 import sympy
+from proof_files import described, parts_of
 
 from polycorner import Manifold, Polyhedron
 from polycorner.proofs import stationary_points
@@ -23,12 +21,6 @@ def shubert(u):
 
 def walls(reach):
     return Polyhedron(PLANE, [reach - X, reach + X, reach - Y, reach + Y])
-
-
-def contents(found, path):
-    """Return what a list says and proves, byte by byte."""
-    with zipfile.ZipFile(found.save(path)) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +68,7 @@ def test_the_number_of_workers_changes_nothing(lattice, workers, tmp_path):
     assert alone.tally.boxes > CHUNKS * LEAST  # several chunks in a round
     found = stationary_points(**problem, workers=workers)
     assert found.tally == alone.tally
-    assert contents(found, tmp_path / "a.zip") == contents(alone, tmp_path / "b.zip")
+    assert parts_of(found.save(tmp_path / "a.zip")) == parts_of(alone.save(tmp_path / "b.zip"))
     for mine, other in zip(found, alone, strict=True):
         assert mine.lower.tolist() == other.lower.tolist()
         assert mine.multipliers == other.multipliers
@@ -126,5 +118,5 @@ def test_a_root_that_vanishes_at_a_point_outside_decides_that_it_is_outside():
 
 
 def test_what_is_saved_names_every_point_of_the_list(lattice, tmp_path):
-    data = json.loads(contents(lattice[1], tmp_path / "list.zip")["problem.json"])
+    data = described(lattice[1].save(tmp_path / "list.zip"))
     assert len(data["points"]) == len(lattice[1])

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-import zipfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 import sympy
 from disks import Disk, Killed
+from proof_files import parts_of
 
 from polycorner import Manifold, Polyhedron, Symmetry
 from polycorner.polyhedra.symmetry import Element
@@ -55,15 +55,10 @@ def small(store, **change):
     return stationary_points(**given, store=store)
 
 
-def contents(found, path):
-    with zipfile.ZipFile(found.save(path)) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
-
-
 def same(found, other, folder):
     assert found.tally == other.tally
     assert np.array_equal(found.undecided, other.undecided)
-    assert contents(found, folder / "a.zip") == contents(other, folder / "b.zip")
+    assert parts_of(found.save(folder / "a.zip")) == parts_of(other.save(folder / "b.zip"))
 
 
 def started(store, log):
