@@ -50,6 +50,8 @@ def problem_text(
     if points:
         yield from ["", "[points]"]
     for name, point in mapping("points", points).items():
+        if not hasattr(point, "__iter__"):
+            refuse(f"points.{name}", "numbers", point, TypeError)
         row = [_number_text(f"points.{name}", x) for x in point]
         if len(row) != manifold.size:
             refuse(f"points.{name}", f"{manifold.size} numbers, one for each coordinate", len(row))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from polycorner.checks import refuse
 from polycorner.polyhedra.faces import projected
 from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.symmetry import Relabelling
@@ -34,8 +35,7 @@ class Curve(Value):
 
     def __post_init__(self) -> None:
         if len(self.points) < 2:
-            msg = f"points: expected at least two points of an edge; got {len(self.points)}"
-            raise ValueError(msg)
+            refuse("points", "at least two points of an edge", len(self.points))
         super().__post_init__()
 
     @property
