@@ -7,9 +7,9 @@ import click
 
 from polycorner.cli import (
     Asked,
-    GroupedCommand,
     Vary,
     branch_options,
+    command,
     examples,
     fail,
     followed,
@@ -31,8 +31,7 @@ RATES = {
 }
 
 
-@click.command(
-    cls=GroupedCommand,
+@command(
     epilog=examples(
         "branches dyad --vary rod=2:2.95 --json", "branches dyad --vary length=8:20 --out out"
     ),

@@ -3,17 +3,14 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from polycorner.cli import GroupedCommand, examples, prepare, report_minima, start_options, working
+from polycorner.cli import command, examples, prepare, report_minima, start_options, working
 from polycorner.dumbbells.cli.options import chosen_pair, pair_options, parameters
 
 if TYPE_CHECKING:
     from polycorner.minimisation import Certificate
 
 
-@click.command(
-    cls=GroupedCommand,
+@command(
     epilog=examples("minima dyad --starts 300", "minima dyad --rod 0.3 --starts 2000 --json"),
 )
 @pair_options
