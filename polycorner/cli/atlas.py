@@ -78,7 +78,7 @@ def spheres(count: int, begin: Begin) -> None:
 @search_options
 def tutorial(begin: Begin) -> None:
     """List the sides of a planar region with seven corners."""
-    from polycorner.models.tutorial import Tutorial
+    from polycorner.models.planar import Tutorial
 
     region = Tutorial()
     planar(begin("tutorial", {}), region.polyhedron, lambda rng: region.starts(rng, STARTS))

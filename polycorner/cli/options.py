@@ -117,7 +117,7 @@ def read_interval(flag: str, written: str, example: str) -> tuple[str, float, fl
     try:
         low, high = map(float, sides.split(":"))
     except ValueError:
-        fail(f"{flag}: expected NAME=LOW:HIGH with two numbers, as in {example}; got {written!r}")
+        fail(f"{flag}: expected two numbers, as in {example}; got {written!r}")
     return name.strip(), low, high
 
 

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.checks import reals
-from polycorner.lookahead import in_order
 from polycorner.minimisation.abundance import Richness, richness
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.loci import Loci, Locus, Paths, check_symmetry
@@ -26,7 +25,7 @@ from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
-from polycorner.workers import Shared, opened_if_any
+from polycorner.workers import Shared, in_order, opened_if_any
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from polycorner.dumbbells import DumbbellDrum
-from polycorner.dumbbells.dynamics import balance
+from polycorner.dumbbells.dynamics import dyads
 from polycorner.dumbbells.dynamics.dyads import heading_at_shift
 from polycorner.dumbbells.studies import turning
 
@@ -36,12 +36,12 @@ def test_impacts_of_dumbbells_that_roll_turn_pairs_of_either_hand_away_from_zero
 def test_the_weights_part_follows_from_single_dumbbells():
     drum = DumbbellDrum()
     found = results(14.0, 50.0)
-    least = heading_at_shift(drum, balance.offsets(drum)[1])
+    least = heading_at_shift(drum, dyads.offsets(drum)[1])
     away = np.degrees(np.sin(2 * np.radians(found["at"] - least)) / 2)
     assert found["single"] < 0
-    expected = found["single"] * balance.return_ratio(drum) * away
+    expected = found["single"] * dyads.return_ratio(drum) * away
     assert found["weight"] == pytest.approx(expected, rel=1e-12)
-    assert found["pressing"] == balance.pressing(drum, found["at"])
+    assert found["pressing"] == dyads.pressing(drum, found["at"])
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from polycorner.bodies import (
 )
 from polycorner.bodies.motions import poses_of
 from polycorner.files import load_trajectory, save_trajectory
-from polycorner.files.arrangements import arrangement_entry, read_arrangement
+from polycorner.files.polyhedra import arrangement_entry, read_arrangement
 from polycorner.files.trajectories import saved_poses
 
 CUBE = polytope([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], 0.1)

@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from polycorner.minimisation.copositivity import least_directions, simplex_minimisers
+from polycorner.minimisation.conditions import least_directions, simplex_minimisers
 
 HORN = np.array(
     [

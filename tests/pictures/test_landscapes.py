@@ -11,7 +11,7 @@ from polycorner import Manifold, Polyhedron
 from polycorner.landscapes import Landscape, Route
 from polycorner.minimisation.problem import pose
 from polycorner.pictures import draw_landscape, draw_landscape_map, film_route, save
-from polycorner.pictures.route_films import evenly
+from polycorner.pictures.landscape_maps import evenly
 from polycorner.pictures.trees import tree_of
 
 

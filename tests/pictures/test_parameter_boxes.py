@@ -1,7 +1,7 @@
 """Cells of a proof as a picture."""
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, minimise, prove
-from polycorner.pictures.parameter_boxes import draw_cells
+from polycorner.pictures.branches import draw_cells
 from polycorner.pictures.style import save
 
 M = Manifold.euclidean("x")

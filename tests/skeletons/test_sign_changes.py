@@ -6,7 +6,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
-from polycorner.skeletons.sign_changes import dips, sign_change
+from polycorner.skeletons.walks import dips, sign_change
 
 heights, slopes = st.floats(1e-3, 10), st.floats(0, 100)
 

@@ -68,8 +68,7 @@ def dyad(
     with working("following equilibria", "arcs") as progress:
         import numpy as np
 
-        from polycorner.dumbbells.statics.minima import dyad_corner
-        from polycorner.dumbbells.statics.pair_minima import energy_symmetry
+        from polycorner.dumbbells.statics.minima import dyad_corner, energy_symmetry
 
         corner, symmetry = dyad_corner(pair, "R").certificate, energy_symmetry(pair)
         varied = corner.problem.parameter_values.keys() & RATES[name].keys()

@@ -63,7 +63,7 @@ def _energy(model: "RelativePlacements", height: float) -> float:
 
 def names(model: "RelativePlacements", found: "Landscape") -> list[str]:
     """Return the paper's names of minima: ``G`` is apart, others are held by contacts."""
-    from polycorner.dumbbells.statics.pair_minima import NAMES
+    from polycorner.dumbbells.statics.minima import NAMES
 
     told = []
     for one in found.minima:

@@ -25,7 +25,7 @@ def dyad(starts: int, seed: int, as_json: bool, out: Path | None, **options: flo
     with working("minimising", "starts") as progress:
         import numpy as np
 
-        from polycorner.dumbbells.statics.pair_minima import kind_of, pair_minima
+        from polycorner.dumbbells.statics.minima import kind_of, pair_minima
 
         found = pair_minima(pair, starts=starts, rng=seed, progress=progress)
 

@@ -193,7 +193,7 @@ def draw_driven_sweep(found: "xr.Dataset", across: str, others: str | None) -> F
 def _bounds(axes: Axes, lengths: Array) -> None:
     """Draw headings of either hand between which noise leaves pairs, and the paper's."""
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.balance import parting_heading
+    from polycorner.dumbbells.dynamics.dyads import parting_heading
 
     drums = [DumbbellDrum(float(x)) for x in np.linspace(lengths.min(), lengths.max(), 100)]
     x = np.array([drum.length for drum in drums])

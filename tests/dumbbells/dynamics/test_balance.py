@@ -8,7 +8,7 @@ import pytest
 
 from polycorner.dumbbells import DumbbellDrum
 from polycorner.dumbbells.drum import GRAVITY
-from polycorner.dumbbells.dynamics import balance
+from polycorner.dumbbells.dynamics import dyads
 from polycorner.dumbbells.dynamics.dyads import heading_at_shift
 
 DRUM = DumbbellDrum()
@@ -26,15 +26,15 @@ def test_at_the_parting_heading_dumbbells_are_equally_high_and_press_no_more(len
     def apart(heading):
         return float(np.abs(np.diff(places(drum, heading)[:, 0]))[0])
 
-    heading = balance.parting_heading(drum)
+    heading = dyads.parting_heading(drum)
     assert apart(heading) < 1e-3 * apart(0.0)
-    assert balance.pressing(drum, heading) == pytest.approx(0.0, abs=1e-12)
-    assert balance.pressing(drum, 5.0) == pytest.approx(apart(5.0), rel=1e-3)
+    assert dyads.pressing(drum, heading) == pytest.approx(0.0, abs=1e-12)
+    assert dyads.pressing(drum, 5.0) == pytest.approx(apart(5.0), rel=1e-3)
 
 
 def test_the_torque_of_the_weight_on_a_pair_is_the_ratio_times_that_on_a_dumbbell():
     drum, small = WIDE, math.radians(1.0)
-    corner = math.radians(heading_at_shift(drum, balance.offsets(drum)[1]))
+    corner = math.radians(heading_at_shift(drum, dyads.offsets(drum)[1]))
 
     def energy(q):
         ends = drum.length / 2 / drum.centre_radius * np.sin(q[..., 2])
@@ -46,7 +46,7 @@ def test_the_torque_of_the_weight_on_a_pair_is_the_ratio_times_that_on_a_dumbbel
 
     single = energy(np.array([[0.0, 0.0, small]])) - energy(np.array([[0.0, 0.0, 0.0]]))
     pair = (rise(small) + rise(-small)) / 2
-    assert pair / (2 * single) == pytest.approx(balance.return_ratio(drum), rel=2e-3)
+    assert pair / (2 * single) == pytest.approx(dyads.return_ratio(drum), rel=2e-3)
 
 
 @pytest.mark.parametrize("length", [12.0, 16.0])
@@ -56,19 +56,19 @@ def test_an_impact_dissipates_the_energy_of_the_impact_mass(length):
     Then ``1/M = 1/m + s^2 / (2 I)``, and a plastic impact dissipates ``M v^2 / 2``.
     """
     drum = DumbbellDrum(length)
-    found = balance.turn_by_impact(drum, 4.0)
-    m, (_, along) = drum.ball_mass, balance.offsets(drum)
+    found = dyads.turn_by_impact(drum, 4.0)
+    m, (_, along) = drum.ball_mass, dyads.offsets(drum)
     inertia = 2 * m * (length**2 / 4 + 0.4 * drum.ball_radius**2)
     expected = 0.5 * 4.0**2 / (1 / m + along**2 / (2 * inertia))
     assert found.dissipated == pytest.approx(expected, rel=0.02)
 
 
 def test_the_turn_by_an_impact_grows_as_the_square_of_the_speed_over_the_friction():
-    one, four = (balance.turn_by_impact(DRUM, v).turn for v in (1.0, 4.0))
+    one, four = (dyads.turn_by_impact(DRUM, v).turn for v in (1.0, 4.0))
     assert one > 0
     assert four / one == pytest.approx(16.0, rel=0.05)
     smooth = replace(DRUM, sliding=(0.15, 0.1), rolling=(0.05, 0.03), rubbing=(0.15, 0.15))
-    assert balance.turn_by_impact(smooth, 1.0).turn == pytest.approx(2 * one, rel=0.05)
+    assert dyads.turn_by_impact(smooth, 1.0).turn == pytest.approx(2 * one, rel=0.05)
 
 
 @pytest.mark.parametrize("speed", [1.0, 4.0])

@@ -8,11 +8,12 @@ import pytest
 
 from polycorner.dumbbells import DumbbellDrum, Shaking
 from polycorner.dumbbells.drum import GRAVITY
-from polycorner.dumbbells.dynamics.bunch import drum_for_bunch, scattered
-from polycorner.dumbbells.dynamics.bunch_in_space import (
+from polycorner.dumbbells.dynamics.bunch import (
     BunchInSpaceRun,
+    drum_for_bunch,
     follow_in_space,
     kicks_of_centres,
+    scattered,
 )
 from polycorner.dumbbells.dynamics.starts import nested_pair
 

@@ -12,14 +12,15 @@ from hypothesis import strategies as st
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.dyads import (
+    correlation_time,
     follow_dyads,
     handedness,
     heading_at_shift,
     minimiser_heading,
+    steady,
 )
 from polycorner.dumbbells.dynamics.pairs import is_dyad
 from polycorner.dumbbells.dynamics.singles import Mean
-from polycorner.dumbbells.dynamics.steady import correlation_time, steady
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.statics.minima import dyad_minima
 from polycorner.motion.noise import Noise

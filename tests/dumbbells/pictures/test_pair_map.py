@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.colors import same_color
 
-from polycorner.dumbbells.pictures.pair_map import draw_pair_map
+from polycorner.dumbbells.pictures.minima_map import draw_pair_map
 from polycorner.dumbbells.statics.skeleton_map import PairMap, Pattern, Signature
 from polycorner.pictures.style import save
 

@@ -11,14 +11,16 @@ from hypothesis import strategies as st
 from polycorner import certify, minimise, stratum_at
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.pictures.placements import relative_placements
-from polycorner.dumbbells.viewer.board import Board, atlas_place, trail
-from polycorner.dumbbells.viewer.sliders import (
+from polycorner.dumbbells.viewer.board import (
     BUTTONS,
     MESSAGE,
+    Board,
     UnknownMessageError,
+    atlas_place,
     coordinates,
     parsed,
     sliders_for,
+    trail,
 )
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)

@@ -7,7 +7,7 @@ import pytest
 
 from polycorner import Manifold, Polyhedron, minimise, stratum_at
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.viewer.steepest_descent import descent
+from polycorner.dumbbells.viewer.board import descent
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
 BEGIN = DRUM.nested("R", heading=0.5, clearance=1.5) + np.array([0.08, 0, 0, 0.06, 0, -0.1])
