@@ -67,7 +67,7 @@ def test_files_are_written_where_the_answer_cannot_be_printed(monkeypatch, tmp_p
     monkeypatch.setattr(click, "echo", closed)
     written = []
     with pytest.raises(BrokenPipeError):
-        deliver({}, str, lambda folder: written.append(folder) or [], as_json=False, out=tmp_path)
+        deliver({}, lambda: "x", lambda f: written.append(f) or [], as_json=False, out=tmp_path)
     assert written == [tmp_path]
 
 
