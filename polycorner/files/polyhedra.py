@@ -1,6 +1,7 @@
 """Polyhedra, functions and arrangements as entries of a file, and made again from these."""
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
@@ -11,7 +12,7 @@ from polycorner.bodies.arrangement import ORIENTATIONS, Arrangement
 from polycorner.bodies.shapes import Body, capsule, compound, disc, polygon, polytope, sphere
 from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
 from polycorner.checks import refuse
-from polycorner.container import number, read_number
+from polycorner.container import FileKind, number, read_number
 from polycorner.files.formulas import formula_text, read_formula, symbols
 from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
@@ -137,16 +138,31 @@ def mismatch(entry: Entries, polyhedron: Polyhedron) -> str:
     return ""
 
 
-def read_problem(
-    content: Entries, polyhedron: Polyhedron | None, energy: Any
-) -> tuple[Problem | None, str]:
-    """Return the problem of a file, or how a polyhedron given instead differs; else nothing."""
-    forms.entries({"problem": forms.entries({})})("", content)
-    own, its = read_polyhedron(content["problem"])
-    chosen = own if polyhedron is None else polyhedron
-    if differs := mismatch(content["problem"], chosen):
-        return None, differs
-    return pose(chosen, its if energy is None else energy), ""
+def load_posed(
+    kind: FileKind,
+    path: str | os.PathLike[str],
+    polyhedron: Polyhedron | None,
+    energy: Any,
+    read: Callable[[Entries, Problem], tuple[Any, str]],
+) -> Any:
+    """Return what is read of a file, for its own polyhedron and energy or for others.
+
+    ``read`` returns it and how it differs from what the functions say, or nothing.
+    """
+    if polyhedron is not None and energy is not None:
+        pose(polyhedron, energy)
+    content = kind.load_json(path)
+    with kind.reading(path):
+        forms.entries({"problem": forms.entries({})})("", content)
+        own, its = read_polyhedron(content["problem"])
+        chosen = own if polyhedron is None else polyhedron
+        differs = mismatch(content["problem"], chosen)
+        if not differs:
+            problem = pose(chosen, its if energy is None else energy)
+            found, differs = read(content, problem)
+    if differs:
+        raise kind.refusal(path, f"is of another polyhedron or energy: {differs}")
+    return found
 
 
 def _words(values: Sequence[Any]) -> str:

@@ -1,4 +1,4 @@
-"""Figures of experiments in the drum: headings of dyads, what turns them, climbing, exits, the keel."""
+"""Figures of experiments in the drum: headings of dyads, what turns them, climbing, exits, keel."""
 
 import math
 from collections.abc import Mapping, Sequence
