@@ -15,7 +15,7 @@ from side_by_side import interleave, print_table, write
 
 from polycorner import minimise
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.statics.pair_minima import (
+from polycorner.dumbbells.statics.minima import (
     energy_symmetry,
     pair_minima,
     scattered,

@@ -22,9 +22,10 @@ from side_by_side import print_table, write
 
 from polycorner import checks
 from polycorner.dumbbells import DumbbellDrum, OutOfRound, RigidDumbbells, Shaking, UnevenFriction
-from polycorner.dumbbells.dynamics.bunch import BunchRun, drum_for_bunch
-from polycorner.dumbbells.dynamics.bunch_in_space import (
+from polycorner.dumbbells.dynamics.bunch import (
     BunchInSpaceRun,
+    BunchRun,
+    drum_for_bunch,
     follow_in_space,
     kicks_of_centres,
 )

@@ -46,7 +46,7 @@ bodies/lattices.py: max(1.0, 2 * reach => max(1.0, reach
 bodies/sizes.py: s - (1 - c) * moving => s - c * moving
 bodies/congruences.py: return mirrors, round( => return mirrors, 0 * round(
 [minimisation]
-minimisation/copositivity.py: x = 1.0 / m - np.einsum => x = 1.0 / m + np.einsum
+minimisation/conditions.py: x = 1.0 / m - np.einsum => x = 1.0 / m + np.einsum
 minimisation/conditions.py: (values[:k] >= -small).all() => (values >= -small).all()
 minimisation/conditions.py: target[i] = -side * np.inf => target[i] = side * np.inf
 minimisation/sensitivities.py: if a.weak: => if len(a.weak) > 1:
@@ -61,7 +61,7 @@ motion/rotations.py: / 2 + 2 * mean * => / 2 + mean *
 motion/engine/sets.py: abs(x) <= b * top => abs(x) <= a * top
 [skeletons/test_tips.py skeletons/test_degenerate_points.py skeletons/test_skeleton.py]
 skeletons/indices.py: low & ~before => low & before
-skeletons/sectors.py: < 1 - tolerances.dependent => < 1
+skeletons/vertex_figures.py: < 1 - tolerances.dependent => < 1
 [sweeps/test_refusals.py sweeps/test_values.py files test_container.py cli dumbbells/cli]
 sweeps/grid.py: np.isnan(array).any() => np.isnan(array).all()
 files/skeletons.py: > active and operator.eq => >= active and operator.eq
@@ -85,7 +85,7 @@ dumbbells/drum_formulas.py: sign * (r - t)) / 2 => sign * (r + t)) / 2
 dumbbells/symmetries.py: [y1, -x1, 1, y2, -x2, 1] => [y1, -x1, 1, y2, x2, 1]
 [dumbbells/statics/test_keel.py dumbbells/dynamics dumbbells/test_turning.py]
 dumbbells/statics/keel.py: - phi * pull => + phi * pull
-dumbbells/dynamics/steady.py: 2 * self.drift.error => 3 * self.drift.error
+dumbbells/dynamics/dyads.py: 2 * self.drift.error => 3 * self.drift.error
 """
 COPIED = ("polycorner", "tests", "benchmarks", "examples", "paper_checks", "docs", "pyproject.toml")
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)

@@ -96,17 +96,15 @@ def paper(
 
     undrawn: list[str] = []
 
-    def write() -> list[Path]:
-        if out is None:
-            return []
-        written, found = _write(run, out, slow=slow)
+    def write(folder: Path) -> list[Path]:
+        written, found = _write(run, folder, slow=slow)
         undrawn.extend(found)
         return written
 
     def text() -> str:
         return table.run_text(run, quiet=verbosity().quiet, width=columns())
 
-    deliver(records(run), text, write, as_json=as_json)
+    deliver(records(run), text, write, as_json=as_json, out=out)
     problems = [*table.problems(run), *undrawn]
     for problem in problems:
         click.echo(f"polycorner: {problem}", err=True)
@@ -196,7 +194,8 @@ def _draw(
 
     with writing(out), working("drawing", "figures") as progress:
         written = write(out, names or None, slow=slow, progress=progress)
-    deliver([str(path) for path in written], str, lambda: written, as_json=as_json)
+    answer = [str(path) for path in written]
+    deliver(answer, str, lambda _: written, as_json=as_json, out=out)
 
 
 # ----------------------------------------------------------------------------------------- names

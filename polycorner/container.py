@@ -23,7 +23,8 @@ import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -213,6 +214,21 @@ def versions() -> dict[str, str]:
 def number(x: float) -> float | str:
     """Return a number as strict JSON has it: infinities and NaN are words."""
     return float(x) if math.isfinite(x) else str(float(x))
+
+
+def plain(value: Any) -> Any:
+    """Return a value as strict JSON has it: dataclasses by field, enumerations by name."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {name: plain(part) for name, part in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    if isinstance(value, Enum):
+        return value.name
+    return number(value) if isinstance(value, float) else value
 
 
 def _no_number(word: str) -> float:

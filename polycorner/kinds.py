@@ -174,7 +174,8 @@ def _like(protocol: type) -> Kind:
         own = getattr(value, "__dict__", ())
         return all(name in own or hasattr(type(value), name) for name in names)
 
-    return Kind(f"something with {' and '.join(names)}", fits, by_class=True)
+    words = " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))
+    return Kind(f"something with {words}", fits, by_class=True)
 
 
 def _either(kinds: Sequence[Kind]) -> Kind:

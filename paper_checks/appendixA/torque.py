@@ -12,8 +12,7 @@ from paper_checks.appendixA.rest import DYNAMIC
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.singles import follow
-from polycorner.dumbbells.statics.keel import RestRegion
-from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
+from polycorner.dumbbells.statics.keel import RestRegion, net_torque, s_curve
 from polycorner.toolkit import Array
 
 DRUM = DumbbellDrum(sliding=(STATIC[1], DYNAMIC[1]), rolling=(STATIC[0], DYNAMIC[0]))

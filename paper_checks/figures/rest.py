@@ -10,9 +10,13 @@ from matplotlib.figure import Figure as Drawing
 from paper_checks.figures import style
 from paper_checks.figures.figure import Figure
 from polycorner.dumbbells.dynamics.singles import keel_of
-from polycorner.dumbbells.pictures.keel import HEADINGS, place_region, place_regions, place_torque
-from polycorner.dumbbells.statics.keel import RestRegion
-from polycorner.dumbbells.statics.keel_formulas import net_torque, s_curve
+from polycorner.dumbbells.pictures.experiments import (
+    HEADINGS,
+    place_region,
+    place_regions,
+    place_torque,
+)
+from polycorner.dumbbells.statics.keel import RestRegion, net_torque, s_curve
 
 KEEL = keel_of(style.DRUM)
 TILT = KEEL.tilt

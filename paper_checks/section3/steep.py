@@ -11,8 +11,7 @@ from paper_checks.appendixA.torque import DRUM
 from paper_checks.framework.claims import Claim, Finding, Means, Verdict
 from paper_checks.section3.singles import risen
 from polycorner.dumbbells.dynamics.singles import follow
-from polycorner.dumbbells.statics.keel import Keel
-from polycorner.dumbbells.statics.keel_formulas import s_curve
+from polycorner.dumbbells.statics.keel import Keel, s_curve
 from polycorner.motion import Noise
 
 RAPID = 1.0  # mm/s, threshold of a rapid descent: several times the speed of climbing

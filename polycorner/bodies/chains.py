@@ -18,10 +18,9 @@ from polycorner.bodies import frames
 from polycorner.bodies.frames import POSE, symbols
 from polycorner.bodies.gaps import FIRST, SECOND
 from polycorner.bodies.rigid_motions import number, spin
-from polycorner.formulas import cache, compositions
-from polycorner.formulas.compositions import Term, composition
-from polycorner.formulas.compositions import stationary as stationary_of
-from polycorner.formulas.families import Family
+from polycorner.formulas import cache, families
+from polycorner.formulas.families import Family, Term, composition
+from polycorner.formulas.families import stationary as stationary_of
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Program
 from polycorner.formulas.translate import compile_expressions
@@ -32,7 +31,7 @@ from polycorner.tolerances import DEFAULT
 if TYPE_CHECKING:
     import sympy
 
-    from polycorner.formulas.compositions import Formulas
+    from polycorner.formulas.families import Formulas
 
     Expressions = dict[str, sympy.Expr]
     Vector = list[sympy.Expr]
@@ -229,7 +228,7 @@ def _entry(variable: str) -> str:
 @lru_cache(maxsize=256)
 def linked(family: Family, chain: Chain) -> Family:
     """Return the gaps of a family as functions of the joints of a chain."""
-    sources = cache.source_key(frames.__name__, compositions.__name__, __name__)
+    sources = cache.source_key(frames.__name__, families.__name__, __name__)
     return Linked(
         family.names,
         chain.reads,

@@ -19,8 +19,7 @@ import numpy as np
 from polycorner.bodies.frames import Frame, symbols
 from polycorner.bodies.gaps import FIRST, SECOND, numbers
 from polycorner.formulas import cache
-from polycorner.formulas.compositions import substituted
-from polycorner.formulas.families import Family
+from polycorner.formulas.families import Family, substituted
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value, cached_property
 

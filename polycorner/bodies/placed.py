@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING
 
 from polycorner.bodies import frames, gaps
 from polycorner.bodies.frames import Frame, symbols
-from polycorner.formulas import compositions
-from polycorner.formulas.compositions import Term, composition, stationary
-from polycorner.formulas.families import Family
+from polycorner.formulas import families
+from polycorner.formulas.families import Family, Term, composition, stationary
 from polycorner.spaces import distances
 
 if TYPE_CHECKING:
     import sympy
 
-    from polycorner.formulas.compositions import Formulas
+    from polycorner.formulas.families import Formulas
 
 Feature = str | tuple[str, str]
 # What the formulas are made by: part of the key of a family that contains them.
-SOURCES = (distances.__name__, frames.__name__, gaps.__name__, compositions.__name__, __name__)
+SOURCES = (distances.__name__, frames.__name__, gaps.__name__, families.__name__, __name__)
 FREE = Frame.FIXED, Frame.FIXED  # put anywhere
 
 

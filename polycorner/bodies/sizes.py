@@ -23,8 +23,7 @@ from polycorner.bodies.shapes import Body, Part
 from polycorner.bodies.walls import HalfSpace
 from polycorner.checks import about, instance, refuse
 from polycorner.formulas import cache
-from polycorner.formulas.compositions import substituted
-from polycorner.formulas.families import Family
+from polycorner.formulas.families import Family, substituted
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.polyhedra.groups import AllOf, AnyOf

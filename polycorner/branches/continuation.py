@@ -15,9 +15,9 @@ import numpy as np
 
 from polycorner.branches.branching import branch_point, curves
 from polycorner.branches.system import FritzJohn
+from polycorner.polyhedra.faces import Stepper
 from polycorner.polyhedra.quotients import WalkOptions
-from polycorner.polyhedra.steppers import Stepper
-from polycorner.skeletons.sign_changes import may_vanish, sign_change
+from polycorner.skeletons.walks import may_vanish, sign_change
 from polycorner.spaces.manifold import Array
 
 P = TypeVar("P", bound=FritzJohn)

@@ -4,6 +4,7 @@ from .minima import report_minima, start_options
 from .options import (
     Command,
     GroupedCommand,
+    added,
     command,
     config_option,
     digits_option,
@@ -12,6 +13,7 @@ from .options import (
     given,
     option,
     output_options,
+    read_interval,
     seed_option,
     verbosity_options,
 )
@@ -20,6 +22,7 @@ from .output import (
     deliver,
     fail,
     json_text,
+    naming,
     prepare,
     remark,
     shown,
@@ -31,7 +34,7 @@ from .output import (
     write_answer,
     writing,
 )
-from .search import RESUMING, Begin, SkeletonSearch, search_options
+from .search import RESUMING, Begin, SkeletonSearch, counts_by_dimension, search_options
 
 __all__ = [
     "RESUMING",
@@ -42,10 +45,12 @@ __all__ = [
     "SkeletonSearch",
     "Telling",
     "Vary",
+    "added",
     "branch_options",
     "columns",
     "command",
     "config_option",
+    "counts_by_dimension",
     "deliver",
     "digits_option",
     "examples",
@@ -55,9 +60,11 @@ __all__ = [
     "given",
     "json_text",
     "landscape_options",
+    "naming",
     "option",
     "output_options",
     "prepare",
+    "read_interval",
     "remark",
     "report_branches",
     "report_landscape",

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.lazy import LazyGroup
+from polycorner.cli.lazy import group
 from polycorner.cli.options import examples, option, output_options, seed_option
 from polycorner.cli.search import (
     RESUMING,
@@ -27,12 +27,7 @@ if TYPE_CHECKING:
 STARTS = 60  # random points from which a search in the plane descends
 
 
-@click.group(
-    cls=LazyGroup,
-    prefix="atlas.",
-    epilog=examples("atlas dyad --plane", "atlas spheres --count 6", "atlas tutorial --out out"),
-    no_args_is_help=True,
-)
+@group("atlas", "atlas dyad --plane", "atlas spheres --count 6", "atlas tutorial --out out")
 def atlas() -> None:
     """List corners, edges and faces of a model.
 
@@ -83,7 +78,7 @@ def spheres(count: int, begin: Begin) -> None:
 @search_options
 def tutorial(begin: Begin) -> None:
     """List the sides of a planar region with seven corners."""
-    from polycorner.models.tutorial import Tutorial
+    from polycorner.models.planar import Tutorial
 
     region = Tutorial()
     planar(begin("tutorial", {}), region.polyhedron, lambda rng: region.starts(rng, STARTS))

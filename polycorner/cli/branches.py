@@ -1,19 +1,20 @@
 """``polycorner branches``: equilibria over a parameter, and the events at which they change."""
 
 from collections.abc import Callable, Mapping
-from functools import wraps
+from functools import partial, wraps
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from polycorner.cli.lazy import LazyGroup
-from polycorner.cli.options import examples, option, output_options
+from polycorner.cli.lazy import group
+from polycorner.cli.options import added, option, output_options, read_interval
 from polycorner.cli.output import (
     deliver,
     fail,
-    remark,
+    naming,
+    save_proof,
     shown,
     timed,
     working,
@@ -52,13 +53,10 @@ class Asked(NamedTuple):
     prove: bool
 
 
-@click.group(
-    cls=LazyGroup,
-    prefix="branches.",
-    epilog=examples(
-        "branches dyad --vary rod=2:2.95", "branches dyad --vary length=14:18 --loop --json"
-    ),
-    no_args_is_help=True,
+@group(
+    "branches",
+    "branches dyad --vary rod=2:2.95",
+    "branches dyad --vary length=14:18 --loop --json",
 )
 def branches() -> None:
     """Follow equilibria of a model over a parameter, through all events."""
@@ -79,55 +77,46 @@ def branch_options(function: Callable[..., None]) -> Callable[..., None]:
         limits = {name: value for name, value in given.items() if value is not None}
         function(vary=read_vary(vary), asked=Asked(loop, prove), limits=limits, **own)
 
-    for add in (
-        output_options,
+    return added(
+        command,
         option(
-            "--seconds", type=click.FloatRange(min=0, min_open=True), group="Search",
-            metavar="S", help="Most seconds; what they leave open is said.",
-        ),
-        option(
-            "--max-arcs", type=click.IntRange(min=1), group="Search",
-            help="Most arcs. [that of the library]",
-        ),
-        option(
-            "--prove", is_flag=True, group="Parameter",
-            help="Prove arcs and events, and that there are no others in a box of the file.",
+            "--vary", required=True, metavar="NAME=LOW:HIGH", group="Parameter",
+            help="The parameter, and the interval that is covered.",
         ),
         option(
             "--loop", is_flag=True, group="Parameter",
             help="Follow a quasi-static system from LOW to HIGH and back, too.",
         ),
         option(
-            "--vary", required=True, metavar="NAME=LOW:HIGH", group="Parameter",
-            help="The parameter, and the interval that is covered.",
+            "--prove", is_flag=True, group="Parameter",
+            help="Prove arcs and events, and that there are no others in a box of the file.",
         ),
-    ):  # fmt: skip
-        command = add(command)
-    return command
+        option(
+            "--max-arcs", type=click.IntRange(min=1), group="Search",
+            help="Most arcs. [that of the library]",
+        ),
+        option(
+            "--seconds", type=click.FloatRange(min=0, min_open=True), group="Search",
+            metavar="S", help="Most seconds; what they leave open is said.",
+        ),
+        output_options,
+    )  # fmt: skip
 
 
 def read_vary(written: str) -> Vary:
     """Return the parameter and the interval of ``--vary``, or end the command."""
-    name, _, sides = written.partition("=")
-    parts = sides.split(":")
-    try:
-        low, high = map(float, parts)
-    except ValueError:
-        fail(f"--vary: expected NAME=LOW:HIGH with two numbers, as in rod=2:2.95; got {written!r}")
+    name, low, high = read_interval("--vary", written, "rod=2:2.95")
     if not (name and isfinite(low) and isfinite(high) and low < high):
         fail(f"--vary: expected NAME=LOW:HIGH with LOW less than HIGH; got {written!r}")
-    return Vary(name.strip(), low, high)
+    return Vary(name, low, high)
 
 
 def followed(certificates: "list[Certificate]", parameter: Any, *args: Any, **options: Any) -> Any:
     """Return the diagram of equilibria, or end the command with what is wrong."""
     from polycorner.branches import branches as follow
 
-    try:
+    with naming(FLAGS):
         return follow(certificates, parameter, *args, **options)
-    except ValueError as error:
-        argument, _, rest = str(error).partition(":")
-        fail(f"{FLAGS.get(argument, argument)}:{rest}")
 
 
 def report_branches(  # noqa: PLR0913 - what is told, and how
@@ -202,27 +191,28 @@ def report_branches(  # noqa: PLR0913 - what is told, and how
 
     archives: list[Path] = []
     if proof is not None:
-        answer["proof"] = _proof(proof)
+        answer["proof"] = told = _proof(proof)
         if out is not None:
-            archives = _saved(proof, out / "branches.proof.zip", answer)
+            with working("checking the proof", "boxes") as progress:
+                archive = out / "branches.proof.zip"
+                archives = save_proof(proof, archive, told, progress=progress)
 
-    def write() -> list[Path]:
-        if out is None:
-            return []
+    def write(folder: Path) -> list[Path]:
         from polycorner.files import save_diagram
         from polycorner.pictures import draw_branches, save
 
-        with writing(out), timed("drawing"):
+        with writing(folder), timed("drawing"):
             figure = draw_branches(found, height, label=label, loop=way)
             return [
-                write_answer(answer, out, "branches.json"),
-                save_diagram(found, out / "saved_branches.json"),
+                write_answer(answer, folder, "branches.json"),
+                save_diagram(found, folder / "saved_branches.json"),
                 *archives,
-                save(figure, out / "branches.png"),
+                save(figure, folder / "branches.png"),
             ]
 
     sheets = [found.sheet, *(part.sheet for part in (proof, way) if part is not None)]
-    deliver(answer, lambda: "\n\n".join(map(shown, sheets)), write, as_json=as_json)
+    text = partial("\n\n".join, map(shown, sheets))
+    deliver(answer, text, write, as_json=as_json, out=out)
 
 
 def _proof(proof: "BranchProof") -> dict[str, Any]:
@@ -234,17 +224,6 @@ def _proof(proof: "BranchProof") -> dict[str, Any]:
         "searched": proof.searched,
         "open": len(proof.open_boxes),
     }
-
-
-def _saved(proof: "BranchProof", archive: Path, answer: dict[str, Any]) -> list[Path]:
-    """Save a proof for the checker, or note why there is no file of it."""
-    with writing(archive), working("checking the proof", "boxes") as progress:
-        try:
-            return [proof.save(archive, progress=progress)]
-        except ValueError as error:
-            answer["proof"]["not_saved"] = str(error)
-            remark(f"{archive.name} is not written: {error}")
-            return []
 
 
 def _loop(way: "Hysteresis") -> dict[str, Any]:

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.lazy import LazyGroup
-from polycorner.cli.options import examples, option, output_options
+from polycorner.cli.lazy import group
+from polycorner.cli.options import added, examples, option, output_options
 from polycorner.cli.output import (
     deliver,
-    fail,
+    naming,
     prepare,
     shown,
     timed,
@@ -39,13 +39,8 @@ MARGIN = 0.1  # of a board's box beyond its walls
 MOST, MOST_BARRIERS = 4, 12  # numbers of passes in a row, and barriers in a table
 
 
-@click.group(
-    cls=LazyGroup,
-    prefix="landscape.",
-    epilog=examples(
-        "landscape dyad", "landscape dyad --rod 1 --json", "landscape pinball --out out"
-    ),
-    no_args_is_help=True,
+@group(
+    "landscape", "landscape dyad", "landscape dyad --rod 1 --json", "landscape pinball --out out"
 )
 def landscape() -> None:
     """Tell over which passes the minima of a model are left, and how high these are."""
@@ -66,23 +61,22 @@ def landscape_options(function: Callable[..., None]) -> Callable[..., None]:
         limits = {name: value for name, value in given.items() if value is not None}
         function(limits=limits, **own)
 
-    for add in (
-        output_options,
+    return added(
+        command,
         option(
-            "--seconds", type=click.FloatRange(min=0, min_open=True), group="Search",
-            metavar="S", help="Most seconds of a list; what it leaves undecided is said.",
+            "--cap", type=float, metavar="E", group="Search",
+            help="Height up to which passes are sought. [all]",
         ),
         option(
             "--max-boxes", type=click.IntRange(min=1), group="Search",
             help="Most boxes of a list. [that of the library]",
         ),
         option(
-            "--cap", type=float, metavar="E", group="Search",
-            help="Height up to which passes are sought. [all]",
+            "--seconds", type=click.FloatRange(min=0, min_open=True), group="Search",
+            metavar="S", help="Most seconds of a list; what it leaves undecided is said.",
         ),
-    ):  # fmt: skip
-        command = add(command)
-    return command
+        output_options,
+    )  # fmt: skip
 
 
 @landscape.command(epilog=examples("landscape pinball --cap 3 --out out"))
@@ -112,12 +106,9 @@ def searched(polyhedron: "Polyhedron", energy: Any, **options: Any) -> "Landscap
     from polycorner.landscapes import landscape as proved
     from polycorner.landscapes import search_landscape
 
-    try:
+    with naming(FLAGS):
         search = search_landscape if "starts" in options else proved
         return search(polyhedron, energy, **options)
-    except ValueError as error:
-        argument, _, rest = str(error).partition(":")
-        fail(f"{FLAGS.get(argument, argument)}:{rest}")
 
 
 @dataclass(frozen=True)
@@ -193,11 +184,13 @@ def report_landscape(
         "barriers": list(_barriers(telling, found, ways, names)),
         "notes": list(found.notes),
     }
-
-    def write() -> list[Path]:
-        return [] if out is None else _write(found, answer, names, telling, out)
-
-    deliver(answer, lambda: shown(_sheet(answer)), write, as_json=as_json)
+    deliver(
+        answer,
+        lambda: shown(_sheet(answer)),
+        lambda folder: _write(found, answer, names, telling, folder),
+        as_json=as_json,
+        out=out,
+    )
 
 
 def _alike(keys: Iterable[Any]) -> list[tuple[Any, list[int]]]:

@@ -5,7 +5,7 @@ An application registers its commands as entry points of the group ``polycorner.
 beside their files, are entry points of ``polycorner.studies`` (:mod:`polycorner.cli.sweep`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
 from importlib import import_module
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from polycorner.cli.options import GroupedCommand, everywhere
+from polycorner.cli.options import GroupedCommand, everywhere, examples
 from polycorner.cli.output import fail
 
 if TYPE_CHECKING:
@@ -24,6 +24,13 @@ UNREGISTERED = (
     "no application is registered in this environment, which was installed before applications "
     "registered their commands: install it again, by `make env` or `pip install -e .`"
 )
+
+
+def group(name: str, *lines: str) -> Callable[[Callable[..., Any]], "LazyGroup"]:
+    """Return the decorator of a group of commands, whose help ends in calls of them."""
+    return click.group(
+        cls=LazyGroup, prefix=f"{name}.", epilog=examples(*lines), no_args_is_help=True
+    )
 
 
 @cache

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.lazy import LazyGroup
-from polycorner.cli.options import Command, command, examples, option
+from polycorner.cli.lazy import group
+from polycorner.cli.options import Command, added, command, examples, option
 from polycorner.cli.output import fail, working
 from polycorner.cli.problems import inner_starts, read, with_problem
 from polycorner.cli.search import RESUMING, Begin, SkeletonSearch, search_options
@@ -22,14 +22,10 @@ if TYPE_CHECKING:
 Rows = list[dict[str, Any]]
 
 
-@click.group(
-    cls=LazyGroup,
-    prefix="measure.",
-    epilog=examples(
-        "measure spheres --count 6",
-        "measure spheres --count 6 --dimension 2 --stickiness 60 --json",
-    ),
-    no_args_is_help=True,
+@group(
+    "measure",
+    "measure spheres --count 6",
+    "measure spheres --count 6 --dimension 2 --stickiness 60 --json",
 )
 def measure() -> None:
     """Weigh the corners and edges of a model, as sticky contacts do.
@@ -41,25 +37,25 @@ def measure() -> None:
 
 def weighting_options(function: Command) -> Command:
     """Add ``--stickiness``, ``--stiffness``, ``--diffusion`` and ``--faces``."""
+    above = click.FloatRange(min=0, min_open=True)
     stickiness = option(
-        "--stickiness", type=click.FloatRange(min=0, min_open=True), default=math.inf,
-        group="Measure",
+        "--stickiness", type=above, default=math.inf, group="Measure",
         help="Factor of a contact, in the units of its function; with a finite one rates are told.",
     )  # fmt: skip
     stiffness = option(
-        "--stiffness", type=click.FloatRange(min=0, min_open=True), default=None, group="Measure",
+        "--stiffness", type=above, default=None, group="Measure",
         help="Second derivative of U / T at the bottom of a contact's well: weighs singular corners"
         " and those with more contacts than dimensions, too.",
     )  # fmt: skip
     diffusion = option(
-        "--diffusion", type=click.FloatRange(min=0, min_open=True), default=1.0, group="Measure",
+        "--diffusion", type=above, default=1.0, group="Measure",
         help="Diffusion constant of every coordinate, for the rates.",
     )  # fmt: skip
     faces = option(
         "--faces", type=click.IntRange(0, 10**8), default=0, group="Measure",
         help="Points of each of four chains that weigh the faces, too; 0 for none.",
     )  # fmt: skip
-    return stickiness(stiffness(diffusion(faces(function))))
+    return added(function, stickiness, stiffness, diffusion, faces)
 
 
 @measure.command(

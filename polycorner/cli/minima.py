@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.lazy import LazyGroup
-from polycorner.cli.options import Command, examples, option, output_options, seed_option
+from polycorner.cli.lazy import group
+from polycorner.cli.options import Command, added, examples, option, output_options, seed_option
 from polycorner.cli.output import deliver, prepare, shown, working, write_answer
 
 if TYPE_CHECKING:
@@ -17,12 +17,7 @@ if TYPE_CHECKING:
 WORDS = "minimising"
 
 
-@click.group(
-    cls=LazyGroup,
-    prefix="minima.",
-    epilog=examples("minima dyad --starts 300", "minima pinball --starts 200"),
-    no_args_is_help=True,
-)
+@group("minima", "minima dyad --starts 300", "minima pinball --starts 200")
 def minima() -> None:
     """List the local minima of a model, found from many starts."""
 
@@ -33,7 +28,7 @@ def start_options(function: Command) -> Command:
         "--starts", type=click.IntRange(min=1), default=1000, group="Search",
         help="Number of starts.",
     )  # fmt: skip
-    return starts(seed_option("the starts")(output_options(function)))
+    return added(function, starts, seed_option("the starts"), output_options)
 
 
 @minima.command(epilog=examples("minima pinball --starts 200 --seed 1"))
@@ -99,11 +94,13 @@ def report_minima(
         "completeness": found.completeness,
         "interrupted": found.interrupted,
     }
-
-    def write() -> list[Path]:
-        return [] if out is None else [write_answer(answer, out, "minima.json")]
-
-    deliver(answer, lambda: shown(_sheet(answer)), write, as_json=as_json)
+    deliver(
+        answer,
+        lambda: shown(_sheet(answer)),
+        lambda folder: [write_answer(answer, folder, "minima.json")],
+        as_json=as_json,
+        out=out,
+    )
     if found.interrupted:
         raise click.exceptions.Exit(130)
 

@@ -69,6 +69,13 @@ def _source(name: str) -> ParameterSource | None:
     return click.get_current_context().get_parameter_source(name)
 
 
+def added(function: Command, *options: Callable[[Command], Command]) -> Command:
+    """Return a command with options, in the order in which its help lists them."""
+    for add in reversed(options):
+        function = add(function)
+    return function
+
+
 def seed_option(of: str, group: str = "Search") -> Callable[[Command], Command]:
     """Return a decorator that adds ``--seed``."""
     return option(
@@ -86,7 +93,9 @@ def digits_option(function: Command) -> Command:
 
 def answer_options(function: Command) -> Command:
     """Add ``--json`` and ``--out``."""
-    for add in (
+    return added(
+        function,
+        option("--json", "as_json", is_flag=True, help="Print JSON, not tables.", group=OUTPUT),
         option(
             "--out",
             type=click.Path(file_okay=False, path_type=Path),
@@ -94,15 +103,22 @@ def answer_options(function: Command) -> Command:
             help="Folder for the JSON file and the figures; made if it is missing.",
             group=OUTPUT,
         ),
-        option("--json", "as_json", is_flag=True, help="Print JSON, not tables.", group=OUTPUT),
-    ):
-        function = add(function)
-    return function
+    )
 
 
 def output_options(function: Command) -> Command:
     """Add ``--json``, ``--out`` and ``--config``."""
     return answer_options(config_option(function))
+
+
+def read_interval(flag: str, written: str, example: str) -> tuple[str, float, float]:
+    """Return the name and the ends of ``NAME=LOW:HIGH``, or end the command."""
+    name, _, sides = written.partition("=")
+    try:
+        low, high = map(float, sides.split(":"))
+    except ValueError:
+        fail(f"{flag}: expected two numbers, as in {example}; got {written!r}")
+    return name.strip(), low, high
 
 
 # ----------------------------------------------------------------------------- quiet and verbose

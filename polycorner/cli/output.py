@@ -3,7 +3,7 @@
 import logging
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -72,6 +72,29 @@ def unfinished(kept: Path) -> None:
     """Say where unfinished work is kept."""
     sys.stdout.flush()
     remark(f"unfinished, kept in {kept}; --resume continues it")
+
+
+@contextmanager
+def naming(flags: Mapping[str, str]) -> Iterator[None]:
+    """End the command where the library refuses an argument, named by the option that gives it."""
+    try:
+        yield
+    except (ValueError, TypeError) as error:
+        argument, colon, rest = str(error).partition(":")
+        if isinstance(error, TypeError) and argument not in flags:
+            raise
+        fail(f"{flags.get(argument, argument)}{colon}{rest}")
+
+
+def save_proof(proof: Any, archive: Path, row: dict[str, Any], **options: Any) -> list[Path]:
+    """Save a proof for the checker, or note in the answer why there is no file of it."""
+    with writing(archive):
+        try:
+            return [Path(proof.save(archive, **options))]
+        except ValueError as error:
+            row["not_saved"] = str(error)
+            remark(f"{archive.name} is not written: {error}")
+            return []
 
 
 @contextmanager
@@ -235,11 +258,12 @@ def write_answer(answer: dict[str, Any], out: Path, name: str) -> Path:
 def deliver(
     answer: dict[str, Any] | list[Any],
     text: Callable[[], str],
-    write: Callable[[], Iterable[Path]] = tuple,
+    write: Callable[[Path], Iterable[Path]] = lambda _: (),
     *,
     as_json: bool,
+    out: Path | None = None,
 ) -> None:
-    """Print an answer as JSON or as text, then write its files and name them.
+    """Print an answer as JSON or as text, then write its files to ``--out`` and name them.
 
     The answer is printed first, so that a full disk does not swallow it; the files are written
     also where nobody reads the answer, as in a broken pipe.
@@ -250,7 +274,7 @@ def deliver(
             click.echo(words)
         sys.stdout.flush()
     finally:
-        written = list(write())
+        written = [] if out is None else list(write(out))
     for path in written:
         if as_json:
             tell(f"wrote {path}")

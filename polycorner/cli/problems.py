@@ -25,23 +25,24 @@ from polycorner.cli.options import (
     examples,
     option,
     output_options,
+    read_interval,
     seed_option,
 )
 from polycorner.cli.output import (
     deliver,
     fail,
     prepare,
-    remark,
+    save_proof,
     shown,
     working,
     write_answer,
-    writing,
 )
-from polycorner.cli.saved import view_motion, view_skeleton
+from polycorner.cli.saved import is_flat, loaded, view_motion, view_problem, view_skeleton
 from polycorner.cli.search import Begin, search_options
 
 if TYPE_CHECKING:
     from polycorner.files import ProblemFile
+    from polycorner.formulas.functions import SmoothFunction
     from polycorner.minimisation import Certificate
     from polycorner.printing import Sheet
     from polycorner.proofs import Proof
@@ -59,12 +60,16 @@ def read(file: Path) -> "ProblemFile":
     """Return a problem, or end the command with what is wrong in its file."""
     from polycorner.files import load_problem
 
-    try:
-        return load_problem(file)
-    except ValueError as error:
-        fail(str(error))
-    except OSError as error:
-        fail(f"{error.filename or file} cannot be read ({error.strerror or error})")
+    problem: ProblemFile = loaded(file, load_problem)
+    return problem
+
+
+def _read_posed(file: Path) -> "tuple[ProblemFile, SmoothFunction]":
+    """Return a problem and its energy, or end the command."""
+    problem = read(file)
+    if problem.energy is None:
+        fail(f"{file}: energy: expected minimise or maximise; got none")
+    return problem, problem.energy
 
 
 # ------------------------------------------------------------------------------------------- prove
@@ -99,26 +104,30 @@ def prove(
 
     First it is said whether the coordinates as they are written lie in the set.
     """
-    problem = read(file)
-    if problem.energy is None:
-        fail(f"{file}: energy: expected minimise or maximise; got none")
+    problem, energy = _read_posed(file)
     names = _chosen(problem, chosen, file)
     sides = dict(_interval(problem, written) for written in boxes)
     prepare(out)
     rows, sheets, written = [], [], []
     for name in names:
         with working(f"proving {name}") as progress:
-            given, proof = _judged(problem, name, digits, sides, minimise, progress)
+            given, proof = _judged(problem, energy, name, digits, sides, minimise, progress)
         rows.append({"point": name, "given": given, **_answer(problem, proof)})
         sheets.append(_sheet(name, given, problem, proof))
         if out is not None and proof.proved:
-            written += _saved(proof, out / f"{name}.zip", rows[-1])
+            saved = save_proof(proof, out / f"{name}.zip", rows[-1])
+            if saved:
+                rows[-1]["file"] = str(saved[0])
+            written += saved
     answer = {"problem": str(file), "title": problem.title, "proofs": rows}
 
-    def write() -> list[Path]:
-        return [] if out is None else [*written, write_answer(answer, out, "proofs.json")]
-
-    deliver(answer, lambda: "\n\n".join(map(shown, sheets)), write, as_json=as_json)
+    deliver(
+        answer,
+        lambda: "\n\n".join(map(shown, sheets)),
+        lambda folder: [*written, write_answer(answer, folder, "proofs.json")],
+        as_json=as_json,
+        out=out,
+    )
 
 
 def membership(problem: "ProblemFile", name: str) -> dict[str, Any]:
@@ -147,13 +156,9 @@ def _chosen(problem: "ProblemFile", chosen: Sequence[str], file: Path) -> list[s
 
 
 def _interval(problem: "ProblemFile", written: str) -> tuple[str, tuple[float, float]]:
-    name, _, sides = written.partition("=")
-    low, _, high = sides.partition(":")
+    name, *ends = read_interval("--box", written, "t=0.9:1.1")
     _check_parameter(problem, "--box", name, written)
-    try:
-        return name, (float(low), float(high))
-    except ValueError:
-        fail(f"--box: expected two numbers, as in {name}=0.9:1.1; got {written!r}")
+    return name, (ends[0], ends[1])
 
 
 def _check_parameter(problem: "ProblemFile", flag: str, name: str, written: str) -> None:
@@ -166,17 +171,16 @@ def _check_parameter(problem: "ProblemFile", flag: str, name: str, written: str)
 
 
 def _judged(
-    problem: "ProblemFile", name: str, digits: int, sides: dict[str, Any], minimise: bool,
-    progress: Any,
+    problem: "ProblemFile", energy: "SmoothFunction", name: str, digits: int,
+    sides: dict[str, Any], minimise: bool, progress: Any,
 ) -> "tuple[dict[str, Any], Proof]":  # fmt: skip
     """Return what is said of the coordinates as written, and of the point near them."""
     import polycorner as pc
 
-    assert problem.energy is not None
     find: Callable[..., Certificate] = pc.minimise if minimise else pc.certify
     try:
         given = membership(problem, name)
-        found = find(problem.polyhedron, problem.energy, problem.points[name])
+        found = find(problem.polyhedron, energy, problem.points[name])
         return given, pc.prove(found, digits=digits, parameters=sides or None, progress=progress)
     except ValueError as error:
         fail(f"point {name}: {error}")
@@ -232,19 +236,6 @@ def _sheet(name: str, given: dict[str, Any], problem: "ProblemFile", proof: "Pro
     return Sheet(name, (*parts, *proof.sheet.parts))
 
 
-def _saved(proof: "Proof", archive: Path, row: dict[str, Any]) -> list[Path]:
-    """Save a proof for the checker, or note why there is no file of it."""
-    with writing(archive):
-        try:
-            saved = [Path(proof.save(archive))]
-        except ValueError as error:
-            row["not_saved"] = str(error)
-            remark(f"{archive.name} is not written: {error}")
-            return []
-    row["file"] = str(archive)
-    return saved
-
-
 # ----------------------------------------------------------------------------------- atlas, minima
 
 
@@ -261,7 +252,7 @@ def atlas(file: Path, begin: Begin) -> None:
 
     d = problem.polyhedron
     found = partial(inner_starts, problem)
-    (planar if _flat(problem) else skeletal)(search, d, found)
+    (planar if is_flat(d) else skeletal)(search, d, found)
 
 
 @command(epilog=examples(f"minima {FILE} --starts 100"))
@@ -269,9 +260,7 @@ def atlas(file: Path, begin: Begin) -> None:
 @start_options
 def minima(file: Path, starts: int, seed: int, as_json: bool, out: Path | None) -> None:
     """Find the local minima of the problem in FILE, from its points and random ones."""
-    problem = read(file)
-    if problem.energy is None:
-        fail(f"{file}: energy: expected minimise or maximise; got none")
+    problem, energy = _read_posed(file)
     prepare(out)
     with working(WORDS, "starts") as progress:
         import numpy as np
@@ -280,7 +269,7 @@ def minima(file: Path, starts: int, seed: int, as_json: bool, out: Path | None) 
 
         points = _starts(problem, np.random.default_rng(seed), starts)
         try:
-            found = search(problem.polyhedron, problem.energy, starts=points, progress=progress)
+            found = search(problem.polyhedron, energy, starts=points, progress=progress)
         except ValueError as error:
             fail(f"{file}: {error}")
     numbers = {id(c): str(k) for k, c in enumerate(found)}
@@ -288,8 +277,8 @@ def minima(file: Path, starts: int, seed: int, as_json: bool, out: Path | None) 
     def described(certificate: "Certificate") -> dict[str, Any]:
         return {"name": numbers[id(certificate)]}
 
-    unit = problem.energy.unit
-    report_minima(file.stem, {"file": str(file)}, found, described, unit, as_json=as_json, out=out)
+    about = {"file": str(file)}
+    report_minima(file.stem, about, found, described, energy.unit, as_json=as_json, out=out)
 
 
 def inner_starts(problem: "ProblemFile", rng: Any) -> Any:
@@ -326,12 +315,6 @@ def _starts(problem: "ProblemFile", rng: Any, count: int) -> Any:
     return manifold.onto(np.vstack([given, found]))
 
 
-def _flat(problem: "ProblemFile") -> bool:
-    """Whether the set is a region of a plane."""
-    d = problem.polyhedron
-    return d.manifold.size == 2 and not d.equations and not d.manifold.circles
-
-
 # --------------------------------------------------------------------------------------- landscape
 
 
@@ -354,9 +337,7 @@ def landscape(
     With proof, if the file gives each coordinate on a line a box and there are no spheres and
     rotations; or as found by searches from --starts.
     """
-    problem = read(file)
-    if problem.energy is None:
-        fail(f"{file}: energy: expected minimise or maximise; got none")
+    problem, energy = _read_posed(file)
     if starts is None:
         limits["box"] = _boxes(problem, file)
     elif unused := limits.keys() - {"cap"}:
@@ -369,8 +350,8 @@ def landscape(
 
             rng = np.random.default_rng(seed)
             limits |= {"starts": _starts(problem, rng, starts), "rng": rng}
-        found = searched(problem.polyhedron, problem.energy, progress=progress, **limits)
-    telling = Telling(unit=problem.energy.unit)
+        found = searched(problem.polyhedron, energy, progress=progress, **limits)
+    telling = Telling(unit=energy.unit)
     report_landscape(file.stem, {"file": str(file)}, found, telling, as_json=as_json, out=out)
 
 
@@ -416,9 +397,7 @@ def branches(
     Parameters that vary are decimals in the file; their values there are those at which it begins,
     in the minima below the points of the file.
     """
-    problem = read(file)
-    if problem.energy is None:
-        fail(f"{file}: energy: expected minimise or maximise; got none")
+    problem, energy = _read_posed(file)
     names = _chosen(problem, chosen, file)
     _check_parameter(problem, "--vary", vary.name, f"{vary.name}={vary.low:g}:{vary.high:g}")
     if of not in ("energy", *problem.polyhedron.manifold.names):
@@ -431,7 +410,7 @@ def branches(
         d, starts = problem.polyhedron, []
         for name in names:
             try:
-                starts.append(minimise(d, problem.energy, problem.points[name]))
+                starts.append(minimise(d, energy, problem.points[name]))
             except ValueError as error:
                 fail(f"point {name}: {error}")
         value = min(starts[0].problem.parameter_values[vary.name])
@@ -440,11 +419,7 @@ def branches(
                  f" {vary.low:g}:{vary.high:g}")  # fmt: skip
         found = followed(starts, vary.name, vary[1:], progress=progress, **limits)
     about = {"file": str(file)}
-    box = (
-        None
-        if None in problem.box
-        else dict(zip(problem.polyhedron.manifold.names, problem.box, strict=True))
-    )
+    box = None if None in problem.box else dict(zip(d.manifold.names, problem.box, strict=True))
     report_branches(
         file.stem, about, found, asked=asked, as_json=as_json, out=out, box=box, height=of
     )
@@ -478,24 +453,10 @@ def view(file: Path, out: Path | None, seed: int) -> None:
         view_skeleton(file, out)
         return
     problem = read(file)
-    if not _flat(problem):
+    if not is_flat(problem.polyhedron):
         fail(f"{file}: expected two coordinates on lines and no equations; polycorner atlas {file}"
              " lists corners, edges and faces")  # fmt: skip
-    with working("drawing"):
-        import numpy as np
+    import numpy as np
 
-        from polycorner import skeleton
-        from polycorner.pictures import draw_region, save
-
-        rng = np.random.default_rng(seed)
-        found = skeleton(problem.polyhedron, inner_starts(problem, rng), rng=rng)
-        figure = draw_region(found, minima=[*problem.points.items()])
-        path = out or Path(file.stem).with_suffix(".png")
-        try:
-            with writing(path):
-                save(figure, path)
-        except ValueError as error:
-            fail(f"--out: {str(error).removeprefix('path: ')}")
-    click.echo(f"wrote {path}")
-    if out is None:
-        click.launch(str(path))
+    rng = np.random.default_rng(seed)
+    view_problem(file, problem, inner_starts(problem, rng), rng, out)

@@ -2,11 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from polycorner.cli.output import fail, working, writing
+
+if TYPE_CHECKING:
+    from polycorner.files import ProblemFile
+    from polycorner.polyhedra.polyhedron import Polyhedron
 
 FILMS, OTHERS = (".html", ".gif", ".mp4"), (".glb", ".gsd", ".xyz")
 
@@ -21,12 +25,11 @@ def view_motion(file: Path, out: Path | None) -> None:
         from polycorner.pictures.exports import write_poses
         from polycorner.pictures.motion_films import film_of
 
-        poses = _loaded(file, saved_poses)
-        _written(path, lambda: (
+        poses = loaded(file, saved_poses)
+        _finish(path, out, lambda: (
             film_of(poses, title=file.stem).save(Path(path)) if path.suffix.lower() in FILMS
             else write_poses(poses, path)
         ))  # fmt: skip
-    _told(path, out)
 
 
 def view_skeleton(file: Path, out: Path | None) -> None:
@@ -36,19 +39,38 @@ def view_skeleton(file: Path, out: Path | None) -> None:
         from polycorner.files import load_skeleton
         from polycorner.pictures import draw_region, save, skeleton_page
 
-        found = _loaded(file, load_skeleton)
-        d = found.polyhedron
-        flat = d.manifold.size == 2 and not d.equations and not d.manifold.circles
+        found = loaded(file, load_skeleton)
+        flat = is_flat(found.polyhedron)
         path = out or Path(file.stem).with_suffix(".png" if flat else ".html")
         if flat and path.suffix.lower() != ".html":
-            _written(path, lambda: save(draw_region(found), path))
+            _finish(path, out, lambda: save(draw_region(found), path))
         else:
             page = skeleton_page(found)
-            _written(path, lambda: write_atomically(path, page, suffix=".html"))
-    _told(path, out)
+            _finish(path, out, lambda: write_atomically(path, page, suffix=".html"))
 
 
-def _loaded(file: Path, load: Callable[[Path], Any]) -> Any:
+def view_problem(
+    file: Path, problem: "ProblemFile", points: Any, rng: Any, out: Path | None
+) -> None:
+    """Write the picture of a problem in the plane, and show it; ``points`` are those of starts."""
+    with working("drawing"):
+        from polycorner import skeleton
+        from polycorner.pictures import draw_region, save
+
+        found = skeleton(problem.polyhedron, points, rng=rng)
+        figure = draw_region(found, minima=[*problem.points.items()])
+        path = out or Path(file.stem).with_suffix(".png")
+        _finish(path, out, lambda: save(figure, path))
+
+
+def is_flat(polyhedron: "Polyhedron") -> bool:
+    """Whether a polyhedron is a region of a plane."""
+    manifold = polyhedron.manifold
+    return manifold.size == 2 and not polyhedron.equations and not manifold.circles
+
+
+def loaded(file: Path, load: Callable[[Path], Any]) -> Any:
+    """Return what is in a file, or end the command with what is wrong in it."""
     try:
         return load(file)
     except (ValueError, TypeError) as error:
@@ -57,15 +79,13 @@ def _loaded(file: Path, load: Callable[[Path], Any]) -> Any:
         fail(f"{error.filename or file} cannot be read ({error.strerror or error})")
 
 
-def _written(path: Path, write: Callable[[], object]) -> None:
+def _finish(path: Path, out: Path | None, write: Callable[[], object]) -> None:
+    """Write a file, name it, and show it where the command line did not name it."""
     try:
         with writing(path):
             write()
     except (ValueError, ImportError) as error:
         fail(f"--out: {str(error).removeprefix('path: ')}")
-
-
-def _told(path: Path, out: Path | None) -> None:
     click.echo(f"wrote {path}")
     if out is None:
         click.launch(str(path))

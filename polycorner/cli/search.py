@@ -1,14 +1,14 @@
 """Searches that are saved as they go, resumed, and reported as tables."""
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from polycorner.cli.options import option, output_options, seed_option
+from polycorner.cli.options import added, option, output_options, seed_option
 from polycorner.cli.output import (
     deliver,
     fail,
@@ -62,21 +62,20 @@ def search_options(function: Callable[..., None]) -> Callable[..., None]:
         options = {name: given[name] for name in SEARCH}
         function(begin=partial(SkeletonSearch, **options), **own)
 
-    for add in (
-        output_options,
-        resume_option,
-        option(
-            "--workers", type=click.IntRange(min=1), group="Search",
-            help="Processes that walk along edges. [this one]",
-        ),
+    return added(
+        command,
+        seed_option("the random directions"),
         option(
             "--budget", type=click.IntRange(min=1), default=100_000, group="Search",
             help="Most edges to trace.",
         ),
-        seed_option("the random directions"),
-    ):  # fmt: skip
-        command = add(command)
-    return command
+        option(
+            "--workers", type=click.IntRange(min=1), group="Search",
+            help="Processes that walk along edges. [this one]",
+        ),
+        resume_option,
+        output_options,
+    )  # fmt: skip
 
 
 class Kept:
@@ -152,14 +151,16 @@ class Kept:
     ) -> None:
         """Print the answer, write the files, and end the process if it was interrupted."""
 
-        def write() -> Iterator[Path]:
-            if self.out is not None:
-                yield write_answer(answer, self.out, name)
-                if self.drawn:
-                    with writing(self.out), timed("drawing"):
-                        yield from draw(self.out)
+        def write(folder: Path) -> Iterator[Path]:
+            yield write_answer(answer, folder, name)
+            if self.drawn:
+                with writing(folder), timed("drawing"):
+                    yield from draw(folder)
 
-        deliver(answer, lambda: shown((sheet or atlas_sheet)(answer)), write, as_json=self.as_json)
+        def text() -> str:
+            return shown((sheet or atlas_sheet)(answer))
+
+        deliver(answer, text, write, as_json=self.as_json, out=self.out)
         if not self.finished:
             with writing(self.state):
                 if self._unsaved is not None:
@@ -269,7 +270,7 @@ class SkeletonSearch(Kept):
         return {
             "model": self.model,
             "parameters": self.parameters,
-            "components": keys(dict(found.components)),
+            "components": counts_by_dimension(found.components),
             **extra,
             "corners": corners,
             "edges": edges,
@@ -318,7 +319,7 @@ class DiskSearch(Kept):
 # ------------------------------------------------------------------------------------------ tables
 
 
-def keys(counts: dict[int, int]) -> dict[str, int]:
+def counts_by_dimension(counts: Mapping[int, int]) -> dict[str, int]:
     """Return counts by dimension with the keys of JSON."""
     return {str(dimension): count for dimension, count in sorted(counts.items())}
 

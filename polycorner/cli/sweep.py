@@ -111,11 +111,13 @@ def sweep(
         fail(str(error))
     except KeyboardInterrupt:
         _end_interrupted(store)
-
-    def write() -> list[Path]:
-        return [] if out is None else _write(plan, found, answer, out)
-
-    deliver(answer, lambda: shown(_sheet(answer)), write, as_json=as_json)
+    deliver(
+        answer,
+        lambda: shown(_sheet(answer)),
+        lambda folder: _write(plan, found, answer, folder),
+        as_json=as_json,
+        out=out,
+    )
     if answer["interrupted"]:
         _end_interrupted(store)
 

@@ -8,9 +8,8 @@ from .statics.depths import PairLandscape, pair_landscape, plane_depth_formula
 from .statics.error_bars import ErrorBar, heading_error_bar, pair_sensitivity
 from .statics.keel import Keel, RestRegion
 from .statics.meetings import meeting_basins, meetings, placement_basins
-from .statics.minima import DyadMinimum, dyad_minima, heading_curve, paper_heading
+from .statics.minima import DyadMinimum, dyad_minima, heading_curve, pair_minima, paper_heading
 from .statics.minima_map import MinimaMap, minima_map
-from .statics.pair_minima import pair_minima
 from .statics.relative import RelativePlacements
 from .statics.skeleton import PairAtlas, long_rod_length, pair_atlas
 from .statics.skeleton_map import PairMap, pair_map

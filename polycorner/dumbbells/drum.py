@@ -35,6 +35,7 @@ from polycorner.toolkit import (
     MovingBody,
     PairContacts,
     PairLaw,
+    about,
     cached_property,
     checked,
     flag,
@@ -159,7 +160,8 @@ class DumbbellDrum(MechanicalSystem):
     def attraction(self, share: float) -> Attraction | None:
         """Return the attraction by a share of the weight of a dumbbell; None if it is 0."""
         force = real("share", share, least=0) * 2 * self.ball_mass * GRAVITY
-        return Attraction(force, self.attraction_range) if share else None
+        with about("share"):
+            return Attraction(force, self.attraction_range) if share else None
 
     @property
     def centre_radius(self) -> float:
@@ -291,11 +293,11 @@ class DumbbellDrum(MechanicalSystem):
         if array.ndim == 1:
             array = array[None]
         if array.ndim != 2 or array.shape[0] != self.count or array.shape[1] not in (3, 4):
-            msg = (
-                f"q: expected shape ({self.count}, 3) for phi, eta, theta or ({self.count}, 4) "
-                f"with psi; got {array.shape}"
+            refuse(
+                "q",
+                f"shape ({self.count}, 3) for phi, eta, theta or ({self.count}, 4) with psi",
+                array.shape,
             )
-            raise ValueError(msg)
         if not np.isfinite(array).all():
             msg = "q: expected finite numbers; got NaN or infinity"
             raise ValueError(msg)

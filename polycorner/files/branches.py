@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -9,8 +10,8 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.branches import Arc, BranchEvent, BranchKind, Diagram
-from polycorner.container import JSON, FileKind, number
-from polycorner.files.polyhedra import Entries, polyhedron_entry, read_problem
+from polycorner.container import JSON, FileKind, plain
+from polycorner.files.polyhedra import Entries, load_posed, polyhedron_entry
 from polycorner.forms import (
     Form,
     count,
@@ -27,7 +28,7 @@ from polycorner.forms import (
 from polycorner.forms import number as real
 from polycorner.kinds import checked
 from polycorner.minimisation.parametric import lifted_problem
-from polycorner.minimisation.problem import Problem, pose
+from polycorner.minimisation.problem import Problem
 from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
@@ -62,42 +63,9 @@ def save_diagram(diagram: Diagram, path: str | os.PathLike[str]) -> "Path":
         If the file cannot be written.
     """
     problem = diagram.problem
-    content = {
-        "problem": polyhedron_entry(problem.polyhedron, problem.energy),
-        "parameter": diagram.parameter,
-        "rates": dict(diagram.rates),
-        "value": diagram.value,
-        "interval": list(diagram.interval),
-        "arcs": [
-            {
-                "active": list(arc.active),
-                "parameters": arc.parameters.tolist(),
-                "points": arc.points.tolist(),
-                "multipliers": {
-                    name: [number(x) for x in values.tolist()]
-                    for name, values in arc.multipliers.items()
-                },
-                "energies": arc.energies.tolist(),
-                "index": arc.index,
-                "events": list(arc.events),
-            }
-            for arc in diagram.arcs
-        ],
-        "events": [
-            {
-                "kind": event.kind.name,
-                "parameter": event.parameter,
-                "point": event.point.tolist(),
-                "before": list(event.before),
-                "after": list(event.after),
-                "functions": list(event.functions),
-                "arcs": list(event.arcs),
-                "note": event.note,
-            }
-            for event in diagram.events
-        ],
-        "closed": diagram.closed,
-    }
+    content = {"problem": polyhedron_entry(problem.polyhedron, problem.energy)}
+    for field in fields(diagram)[1:]:  # all but the problem
+        content[field.name] = plain(getattr(diagram, field.name))
     return KIND.save_json(path, content)
 
 
@@ -129,19 +97,15 @@ def load_diagram(
     ValueError
         If the file is no diagram, was changed, or is of another polyhedron or energy.
     """
-    if polyhedron is not None and energy is not None:
-        pose(polyhedron, energy)
-    content = KIND.load_json(path)
-    with KIND.reading(path):
-        problem, differs = read_problem(content, polyhedron, energy)
-        if problem is not None:
-            differs = _lacking(content, problem)
-        if problem is not None and not differs:
-            diagram = _read(content, problem)
-            differs = next(_differences(diagram), "")
-    if problem is None or differs:
-        raise KIND.refusal(path, f"is of another polyhedron or energy: {differs}")
-    return diagram
+
+    def read(content: Entries, problem: Problem) -> tuple[Diagram | None, str]:
+        if differs := _lacking(content, problem):
+            return None, differs
+        diagram = _read(content, problem)
+        return diagram, next(_differences(diagram), "")
+
+    found: Diagram = load_posed(KIND, path, polyhedron, energy, read)
+    return found
 
 
 def _lacking(content: Entries, problem: Problem) -> str:

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from polycorner import checks
-from polycorner.container import JSON, FileKind, number
-from polycorner.files.polyhedra import Entries, polyhedron_entry, read_problem
+from polycorner.container import JSON, FileKind, number, plain
+from polycorner.files.polyhedra import Entries, load_posed, polyhedron_entry
 from polycorner.forms import count, entries, flag, made, many, optional, row, text, word
 from polycorner.forms import number as real
 from polycorner.kinds import checked
 from polycorner.landscapes import Landscape, Minimum, Pass, Route, Side
 from polycorner.landscapes.barriers import Kind
-from polycorner.minimisation.problem import Problem, pose
+from polycorner.minimisation.problem import Problem
 from polycorner.tolerances import DEFAULT
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def save_landscape(landscape: Landscape, path: str | os.PathLike[str]) -> "Path"
         "problem": polyhedron_entry(problem.polyhedron, problem.energy),
         "minima": [_point(problem, one) for one in landscape.minima],
         "passes": [
-            _point(problem, p) | {"index": p.index, "sides": [_side(s) for s in p.sides]}
+            _point(problem, p) | {"index": p.index, "sides": plain(p.sides)}
             for p in landscape.passes
         ],
         "proved": landscape.proved,
@@ -93,20 +93,18 @@ def load_landscape(
     ValueError
         If the file is no landscape, was changed, or is of another polyhedron or energy.
     """
-    if polyhedron is not None and energy is not None:
-        pose(polyhedron, energy)
-    content = KIND.load_json(path)
-    with KIND.reading(path):
-        problem, differs = read_problem(content, polyhedron, energy)
-        if problem is not None:
-            read = _read(content, problem)
-            differs = next(_differences(read, problem), "")
-    if problem is None or differs:
-        raise KIND.refusal(path, f"is of another polyhedron or energy: {differs}")
+    found: Landscape = load_posed(KIND, path, polyhedron, energy, _made)
+    return found
+
+
+def _made(content: Entries, problem: Problem) -> tuple[Landscape, str]:
+    """Return the landscape, and in what functions differ from the file."""
+    read = _read(content, problem)
     minima = tuple(Minimum(**_fields(Minimum, one)) for one in read["minima"])
     passes = tuple(Pass(**_fields(Pass, one)) for one in read["passes"])
     others = {key: read[key] for key in ("proved", "cap", "region", "euler")}
-    return Landscape(problem, minima, passes, notes=tuple(read["notes"]), **others)
+    found = Landscape(problem, minima, passes, notes=tuple(read["notes"]), **others)
+    return found, next(_differences(read, problem), "")
 
 
 # ----------------------------------------------------------------------------------------- entries
@@ -114,29 +112,8 @@ def load_landscape(
 
 def _point(problem: Problem, one: Minimum | Pass) -> Entries:
     (values,) = problem.evaluate(one.point, 0)
-    return {
-        "point": one.point.tolist(),
-        "energy": [number(e) for e in one.energy],
-        "active": list(one.active),
-        "kind": one.kind,
-        "orbit": one.orbit,
-        "values": [number(x) for x in values.tolist()],
-    }
-
-
-def _side(side: Side) -> Entries:
-    route = side.route
-    return {
-        "minimum": side.minimum,
-        "route": None
-        if route is None
-        else {
-            "vertices": route.vertices.tolist(),
-            "energies": route.energies.tolist(),
-            "top": number(route.top),
-            "verified": route.verified,
-        },
-    }
+    told = {key: plain(getattr(one, key)) for key in ("point", "energy", "active", "kind", "orbit")}
+    return told | {"values": plain(values)}
 
 
 def _fields(kind: Any, read: Entries) -> Entries:

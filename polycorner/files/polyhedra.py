@@ -1,11 +1,18 @@
-"""Polyhedra and functions as entries of a file, formulas included, and made again from these."""
+"""Polyhedra, functions and arrangements as entries of a file, and made again from these."""
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
+import numpy as np
+
 from polycorner import forms
-from polycorner.container import number, read_number
+from polycorner.bodies.arrangement import ORIENTATIONS, Arrangement
+from polycorner.bodies.shapes import Body, capsule, compound, disc, polygon, polytope, sphere
+from polycorner.bodies.walls import Cylinder, HalfSpace, Wall
+from polycorner.checks import refuse
+from polycorner.container import FileKind, number, read_number
 from polycorner.files.formulas import formula_text, read_formula, symbols
 from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
@@ -131,16 +138,31 @@ def mismatch(entry: Entries, polyhedron: Polyhedron) -> str:
     return ""
 
 
-def read_problem(
-    content: Entries, polyhedron: Polyhedron | None, energy: Any
-) -> tuple[Problem | None, str]:
-    """Return the problem of a file, or how a polyhedron given instead differs; else nothing."""
-    forms.entries({"problem": forms.entries({})})("", content)
-    own, its = read_polyhedron(content["problem"])
-    chosen = own if polyhedron is None else polyhedron
-    if differs := mismatch(content["problem"], chosen):
-        return None, differs
-    return pose(chosen, its if energy is None else energy), ""
+def load_posed(
+    kind: FileKind,
+    path: str | os.PathLike[str],
+    polyhedron: Polyhedron | None,
+    energy: Any,
+    read: Callable[[Entries, Problem], tuple[Any, str]],
+) -> Any:
+    """Return what is read of a file, for its own polyhedron and energy or for others.
+
+    ``read`` returns it and how it differs from what the functions say, or nothing.
+    """
+    if polyhedron is not None and energy is not None:
+        pose(polyhedron, energy)
+    content = kind.load_json(path)
+    with kind.reading(path):
+        forms.entries({"problem": forms.entries({})})("", content)
+        own, its = read_polyhedron(content["problem"])
+        chosen = own if polyhedron is None else polyhedron
+        differs = mismatch(content["problem"], chosen)
+        if not differs:
+            problem = pose(chosen, its if energy is None else energy)
+            found, differs = read(content, problem)
+    if differs:
+        raise kind.refusal(path, f"is of another polyhedron or energy: {differs}")
+    return found
 
 
 def _words(values: Sequence[Any]) -> str:
@@ -190,3 +212,106 @@ def _read_tree(entry: Any, functions: Sequence[SmoothFunction]) -> Any:
         return functions[entry]
     ((word, children),) = entry.items()
     return {"any": AnyOf, "all": AllOf}[word](*[_read_tree(c, functions) for c in children])
+
+
+# ------------------------------------------------------------------------------------- arrangements
+
+MOST_POINTS = 10_000  # of a part in a file, so that hulls of forged ones take no time
+
+
+def arrangement_entry(arrangement: Arrangement) -> dict[str, Any]:
+    """Return an arrangement as plain values."""
+    turning = np.asarray(arrangement.turning).tolist()
+    period = arrangement.period
+    sides = None if period is None else [x if np.isfinite(x) else None for x in map(_real, period)]
+    return {
+        "bodies": _bodies(arrangement.named),
+        "fixed": _bodies(arrangement.fixed),
+        "walls": {name: _wall(wall) for name, wall in arrangement.walls.items()},
+        "orientations": arrangement.orientations,
+        "unit": arrangement.unit,
+        "period": sides,
+        "turning": turning,
+    }
+
+
+def read_arrangement(place: str, entry: Any) -> Arrangement:
+    """Return the arrangement of plain values, all of which are checked.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the entry.
+    """
+    numbers = forms.many(forms.number())
+    turning = entry.get("turning") if isinstance(entry, dict) else None
+    told = forms.entries(
+        {
+            "bodies": forms.mapped(forms.text, _read_body),
+            "fixed": forms.mapped(forms.text, _read_body),
+            "walls": forms.mapped(forms.text, _read_wall),
+            "orientations": forms.word(*ORIENTATIONS),
+            "unit": forms.text,
+            "period": forms.optional(forms.many(forms.optional(forms.number()))),
+            "turning": numbers if isinstance(turning, list) else forms.number(),
+        }
+    )(place, entry)
+    return Arrangement(**told)
+
+
+def _real(value: Any) -> float:
+    return float(value)
+
+
+def _bodies(bodies: Mapping[str, Body]) -> dict[str, Any]:
+    return {
+        name: {part: [shape.radius, shape.points.tolist()] for part, shape in body.parts.items()}
+        for name, body in bodies.items()
+    }
+
+
+def _wall(wall: Wall) -> dict[str, Any]:
+    if isinstance(wall, HalfSpace):
+        return {"normal": wall.normal.tolist(), "point": wall.point.tolist()}
+    axis = None if wall.axis is None else wall.axis.tolist()
+    waves = [[k, *wave] for k, wave in wall.waves.items()]
+    told = {"radius": wall.radius, "axis": axis, "point": wall.point.tolist()}
+    return told | {"spin": wall.spin, "waves": waves}
+
+
+def _read_body(place: str, entry: Any) -> Body:
+    shape = forms.row(forms.number(), forms.many(forms.many(forms.number())))
+    parts = forms.mapped(forms.text, shape)(place, entry)
+    made = {name: _part(f"{place}.{name}", *told) for name, told in parts.items()}
+    if len(made) == 1 and "" in made:
+        return made[""]
+    return compound(made)
+
+
+def _part(place: str, radius: float, points: list[list[float]]) -> Body:
+    sizes = {len(point) for point in points}
+    if sizes not in ({2}, {3}) or len(points) > MOST_POINTS:
+        refuse(place, f"up to {MOST_POINTS} points, all in the plane or all in space", len(points))
+    flat = sizes == {2}
+    if len(points) == 1:
+        return (disc if flat else sphere)(radius, points[0])
+    if len(points) == 2:
+        return capsule(points[0], points[1], radius)
+    return (polygon if flat else polytope)(points, radius)
+
+
+def _read_wall(place: str, entry: Any) -> Wall:
+    numbers = forms.many(forms.number())
+    if isinstance(entry, dict) and "normal" in entry:
+        return HalfSpace(**forms.entries({"normal": numbers, "point": numbers})(place, entry))
+    wave = forms.row(forms.count, forms.number(), forms.number())
+    told = forms.entries(
+        {
+            "radius": forms.number(),
+            "axis": forms.optional(numbers),
+            "point": numbers,
+            "spin": forms.number(),
+            "waves": forms.many(wave),
+        }
+    )(place, entry)
+    return Cylinder(**told | {"waves": {k: (a, p) for k, a, p in told["waves"]}})

@@ -18,14 +18,13 @@ def content(argument: str, path: str | os.PathLike[str], megabytes: float) -> by
     OSError
         If it cannot be read.
     """
-    most = int(MIB * megabytes)
     with Path(path).open("rb") as file:
         if not Path(path).is_file():
             refuse(argument, "an ordinary file", os.fspath(path))
-        found = file.read(most + 1)
-    if len(found) > most:
-        refuse(f"{argument}: {name_of(path)}", f"at most {megabytes:g} MiB", "more")
-    return found
+        size = os.fstat(file.fileno()).st_size
+        if size > MIB * megabytes:
+            refuse(f"{argument}: {name_of(path)}", f"at most {megabytes:g} MiB", "more")
+        return file.read(size)
 
 
 def name_of(path: str | os.PathLike[str]) -> str:

@@ -38,10 +38,9 @@ from polycorner.polyhedra.quotients import Quotient, WalkOptions
 from polycorner.polyhedra.strata import distances
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.skeletons.assembly import assembled
-from polycorner.skeletons.curves import Curve
+from polycorner.skeletons.curves import Curve, FaceCrossing, Flag
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.flags import FaceCrossing, Flag
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.probing import ISLAND, Patch
 from polycorner.skeletons.registry import FoundCorner

@@ -14,7 +14,6 @@ from polycorner.bodies.arrangement import Arrangement
 from polycorner.bodies.motions import Poses, by_kind, recorded
 from polycorner.checks import increasing, instance, names, refuse
 from polycorner.container import BINARY, FileKind
-from polycorner.files.arrangements import arrangement_entry, read_arrangement
 from polycorner.files.formulas import formula_text
 from polycorner.files.motions import (
     PARTICIPANTS,
@@ -27,6 +26,7 @@ from polycorner.files.motions import (
     read_motion,
     save_dataset,
 )
+from polycorner.files.polyhedra import arrangement_entry, read_arrangement
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked

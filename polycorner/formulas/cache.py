@@ -27,6 +27,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from polycorner.atomic import PART, write_atomically
+from polycorner.checks import refuse
 
 VARIABLE = "POLYCORNER_CACHE_DIR"
 KEY = "key"  # the file beside the machine code that holds the key of the digests
@@ -147,8 +148,7 @@ def sources_digest(
     """
     spec = find_spec(package)
     if spec is None or not spec.submodule_search_locations:
-        msg = f"package: expected the name of an importable package; got {package!r}"
-        raise ValueError(msg)
+        refuse("package", "the name of an importable package", package)
     folders = map(Path, spec.submodule_search_locations)
     files = sorted(file for folder in folders for file in folder.glob("*.py"))
     chosen = [file for file in files if file.name in (only or {file.name} - {*without})]

@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from polycorner.formulas import cache, compositions, programs
-from polycorner.formulas.compositions import Term, composition, stationary, symbol
-from polycorner.formulas.families import Family
+from polycorner.formulas import cache, families, programs
+from polycorner.formulas.families import Family, Term, composition, stationary, symbol
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Graph, Program
 
 if TYPE_CHECKING:
     import sympy
 
-    from polycorner.formulas.compositions import Formulas
+    from polycorner.formulas.families import Formulas
 
 # Second derivatives up to which functions are fused: nine gaps of 14 coordinates have 1764, which
 # take three seconds to compile, once.  Kernels of single functions compile in a tenth of that.
@@ -125,7 +124,7 @@ def _family(bound: tuple[_Bound, ...], variables: int, parameters: int) -> Famil
 
 
 def _sources() -> str:
-    return cache.source_key(compositions.__name__, programs.__name__, __name__)
+    return cache.source_key(families.__name__, programs.__name__, __name__)
 
 
 def _formulas(bound: tuple[_Bound, ...]) -> "Formulas":

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from polycorner.checks import refuse
+
 NOTHING = c_char * 0  # as long as any array is
 
 
@@ -73,8 +75,7 @@ class Layout:
                 continue
             array = np.ascontiguousarray(value, dtype=kind)
             if array.ndim != dimensions:
-                msg = f"{name}: expected an array of {dimensions} dimensions; got {array.ndim}"
-                raise ValueError(msg)
+                refuse(name, f"an array of {dimensions} dimensions", array.ndim)
             arrays.append(array)
             words.append(_address(array))
             words += array.shape

@@ -16,7 +16,7 @@ from polycorner.landscapes.barriers import Kind
 from polycorner.landscapes.pieces import parted
 from polycorner.landscapes.walks import Mask, Orbits, Walks
 from polycorner.minimisation.certificate import Certificate
-from polycorner.minimisation.copositivity import simplex_minimisers
+from polycorner.minimisation.conditions import simplex_minimisers
 from polycorner.minimisation.findings import OPEN, Local
 from polycorner.minimisation.methods import FARTHEST
 from polycorner.minimisation.problem import Problem

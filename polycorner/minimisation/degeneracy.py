@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from polycorner.minimisation.conditions import cone_rays
 from polycorner.minimisation.constancy import (
     Constancy,
     constancy,
@@ -25,7 +26,6 @@ from polycorner.minimisation.constancy import (
     symmetric_directions,
     without,
 )
-from polycorner.minimisation.copositivity import cone_rays
 from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.findings import Analysis, Decision, Local, undecided
 from polycorner.minimisation.germs import (

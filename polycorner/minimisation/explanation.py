@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from polycorner.minimisation.copositivity import MAX_RAYS
+from polycorner.minimisation.conditions import MAX_RAYS
 from polycorner.minimisation.descent.statuses import NEARLY_FLAT
 from polycorner.minimisation.findings import (
     Analysis,

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.minimisation.jets import function_series
+from polycorner.minimisation.jets import EPSILON, Ring, function_series, ring
 from polycorner.minimisation.problem import Problem
-from polycorner.minimisation.series import EPSILON, Ring, ring
 from polycorner.polyhedra.cones import null_space
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value

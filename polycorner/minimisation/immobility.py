@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 from polycorner.checks import instance, refuse
 from polycorner.errors import SolverError
 from polycorner.kinds import checked
-from polycorner.minimisation.convex import ONE_AT_A_TIME, solve
+from polycorner.minimisation.scp import ONE_AT_A_TIME, solve
 from polycorner.polyhedra.cones import Rows, linear_programme, null_space
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import stratum_at

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.checks import reals
-from polycorner.lookahead import in_order
 from polycorner.minimisation.abundance import Richness, richness
 from polycorner.minimisation.certificate import Certificate
 from polycorner.minimisation.loci import Loci, Locus, Paths, check_symmetry
@@ -26,7 +25,7 @@ from polycorner.signatures import shown
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import RANK_TOLERANCE, TOLERANCE, Tolerances
 from polycorner.values import Checked, cached_property
-from polycorner.workers import Shared, opened_if_any
+from polycorner.workers import Shared, in_order, opened_if_any
 
 if TYPE_CHECKING:
     from polycorner.minimisation.problem import Energy
@@ -157,13 +156,11 @@ def start_points(
         count = checks.whole("starts", starts, least=1, most=checks.MOST)
         return _sampled(problem, count, *_bounds(problem, box), checks.generator("rng", rng))
     if box is not None:
-        msg = f"box: expected None with starts given as points; got {box!r}"
-        raise ValueError(msg)
+        checks.refuse("box", "None with starts given as points", box)
     points = manifold.points(np.atleast_2d(reals("starts", starts)), "starts")
     points = manifold.placed(points, "starts")
     if points.ndim != 2 or not len(points):
-        msg = f"starts: expected points of shape (k, {problem.dimension}); got {points.shape}"
-        raise ValueError(msg)
+        checks.refuse("starts", f"points of shape (k, {problem.dimension})", points.shape)
     finite = np.isfinite(problem.energy.value(points))
     if not finite.all():
         k = int((~finite).argmax())
@@ -220,20 +217,15 @@ def _bounds(problem: Problem, box: Any) -> tuple[Array, Array]:
     manifold = problem.polyhedron.manifold
     given = [None] * problem.dimension if box is None else box
     if not isinstance(given, Sequence | np.ndarray) or _length(given) != problem.dimension:
-        msg = (
-            f"box: expected bounds (low, high) for each of {', '.join(manifold.names)}; got {box!r}"
-        )
-        raise ValueError(msg)
+        checks.refuse("box", f"bounds (low, high) for each of {', '.join(manifold.names)}", box)
     bounds, curved = [], {name for f in manifold.factors for name in f.names}
     for name, period, pair in zip(manifold.names, manifold.periods, given, strict=True):
         circle = pair is None and np.isfinite(period)
         if name in curved and pair is not None:
-            msg = f"box: expected None for {name}, sampled from the whole sphere; got {pair!r}"
-            raise ValueError(msg)
+            checks.refuse("box", f"None for {name}, sampled from the whole sphere", pair)
         bound = (-period / 2, period / 2) if circle else (0, 1) if name in curved else pair
         if not _is_interval(bound):
-            msg = f"box: expected low < high for {name}, to sample points; got {pair!r}"
-            raise ValueError(msg)
+            checks.refuse("box", f"low < high for {name}, to sample points", pair)
         bounds.append(bound)
     low, high = np.array(bounds, dtype=np.float64).T
     return low, high

@@ -5,12 +5,13 @@ region ([BV] ch. 4, [NW] ch. 18).
 """
 
 from dataclasses import dataclass
+from threading import RLock
+from typing import Any
 
 import cvxpy as cp
 import numpy as np
 
 from polycorner.errors import SolverError
-from polycorner.minimisation.convex import ONE_AT_A_TIME, solve
 from polycorner.minimisation.polishing import Endpoint, polished
 from polycorner.minimisation.problem import Problem
 from polycorner.polyhedra.cones import unit_rows
@@ -18,6 +19,29 @@ from polycorner.polyhedra.polyhedron import Piece
 from polycorner.polyhedra.strata import distances
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import SEARCH, Tolerances
+
+# cvxpy numbers the variables of all threads by one counter, and warns of inaccurate solutions;
+# filters that silence warnings are those of all threads, too.
+
+ONE_AT_A_TIME = RLock()  # to be held while programmes are stated
+
+
+def solve(programme: Any) -> bool:
+    """Solve a programme, perhaps inaccurately; return whether its variables have values."""
+    import cvxpy as cp
+
+    with ONE_AT_A_TIME:
+        try:
+            data, chain, inverse = programme.get_problem_data(cp.CLARABEL, solver_opts={})
+            found = chain.solve_via_data(programme, data, warm_start=True)
+        except cp.error.SolverError:
+            return False  # numerical failure on these data
+        solution = chain.invert(found, inverse)
+        if solution.status in cp.settings.ERROR:
+            return False
+        programme.unpack(solution)
+    return solution.status in cp.settings.SOLUTION_PRESENT
+
 
 PENALTY = 10.0  # initial weight of the constraint violation in the merit function
 

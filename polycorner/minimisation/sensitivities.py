@@ -125,8 +125,7 @@ class Sensitivity(Checked, Printed):
             with checks.about("quantity"):
                 return SmoothFunction.quantity("quantity", quantity, manifold)
         if quantity.manifold != manifold:
-            msg = f"quantity: expected a function on {', '.join(manifold.names)}; got {quantity!r}"
-            raise ValueError(msg)
+            checks.refuse("quantity", f"a function on {', '.join(manifold.names)}", quantity)
         return quantity
 
     @checked

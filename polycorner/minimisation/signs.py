@@ -21,7 +21,7 @@ from math import lcm
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.minimisation.series import Ring, ring
+from polycorner.minimisation.jets import Ring, ring
 from polycorner.polyhedra.cones import null_space
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT

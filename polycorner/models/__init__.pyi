@@ -1,4 +1,3 @@
-from .clusters import LennardJones
 from .disks.configurations import CriticalConfiguration
 from .disks.critical import CriticalSearch
 from .disks.disks import TorusDisks
@@ -9,8 +8,8 @@ from .packings.periodic import PeriodicPacking
 from .packings.sphere_points import PointsOnSphere
 from .packings.tables import CoordinateTable, read_coordinates
 from .pinball import Pinball
-from .spheres import SphereCluster
-from .tutorial import Tutorial
+from .planar import Tutorial
+from .spheres import LennardJones, SphereCluster
 
 __all__ = [
     "BasinHopping",

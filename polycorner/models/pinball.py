@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.checks import reals
+from polycorner.checks import reals, refuse
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
@@ -220,15 +220,12 @@ def _check(board: Pinball) -> None:
         raise ValueError(msg)
     for pin in board.pins:
         if not pin[2] > 0:
-            msg = f"pins: expected positive radii; got {pin}"
-            raise ValueError(msg)
+            refuse("pins", "positive radii", pin)
     for wedge in board.wedges:
         corners = np.array(wedge)
         longest = max(math.dist(corners[i], corners[i - 1]) for i in range(3))
         if abs(_double_area(corners)) <= DEFAULT.alike * longest**2:
-            msg = f"wedges: expected three corners that are not in line; got {wedge}"
-            raise ValueError(msg)
+            refuse("wedges", "three corners that are not in line", wedge)
     for cup in board.cups:
         if not 0 < cup[2] < cup[3]:
-            msg = f"cups: expected radii with 0 < inner < outer; got {cup}"
-            raise ValueError(msg)
+            refuse("cups", "radii with 0 < inner < outer", cup)

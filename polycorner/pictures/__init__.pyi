@@ -1,19 +1,13 @@
 from .arrangements import draw_arrangement
-from .barcodes import draw_barcode
-from .branches import draw_branches
+from .branches import draw_branches, draw_cells, draw_event_map
 from .clusters import draw_clusters
-from .disks import draw_critical
-from .event_maps import draw_event_map
+from .disks import draw_critical, draw_packing
 from .exports import save_motion
-from .landscape_maps import draw_landscape_map
-from .landscapes import draw_landscape
-from .motion_films import MotionFilm, film
-from .motion_strips import draw_motion
-from .packings import draw_packing
-from .parameter_boxes import draw_cells
+from .landscape_maps import draw_landscape_map, film_route
+from .landscapes import draw_barcode, draw_landscape
+from .motion_films import MotionFilm, draw_motion, film
+from .motion_pages import skeleton_page
 from .regions import draw_region
-from .route_films import film_route
-from .skeleton_pages import skeleton_page
 from .solids import (
     Isosurface,
     SharpSurface,

@@ -1,4 +1,4 @@
-"""Figures of disks on a torus: critical configurations with images, contacts and forces."""
+"""Figures of disks on a torus, of critical configurations and of jammed packings."""
 
 import math
 from collections.abc import Sequence
@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 
+from polycorner import checks
 from polycorner.checks import refuse, whole
 from polycorner.kinds import checked
 from polycorner.models.disks.configurations import CriticalConfiguration
 from polycorner.models.disks.disks import TorusDisks
+from polycorner.models.packings.jammed import JammedPacking
 from polycorner.spaces.manifold import Array
 
 # Colours that stay apart for colour-blind readers (Okabe and Ito), by index.
@@ -118,3 +120,76 @@ def _cell(model: TorusDisks) -> Array:
     around = nearest[np.argsort(np.arctan2(nearest[:, 1], nearest[:, 0]))]
     pairs = zip(around, np.roll(around, -1, axis=0), strict=True)
     return np.array([np.linalg.solve(np.stack(pair), [0.5, 0.5]) for pair in pairs])
+
+
+# ---------------------------------------------------------------------------------- jammed packings
+
+BODY, LOOSE, EDGE, PRESS = "#BBD3E8", "#F2F2F2", "white", "#B2182B"
+SIZE = 7.0  # inches
+MARGIN = 0.02  # of the box
+WIDEST = 6.0  # points, in a picture of a hundred discs
+MOST_LARGEST = 0.995  # quantile of the forces that has the greatest width
+
+
+def draw_packing(packing: JammedPacking) -> Figure:
+    """Draw a packing of discs in its periodic box, with a line for every contact force.
+
+    The line between two centres is the wider the larger the force; discs without force are pale.
+
+    Parameters
+    ----------
+    packing : JammedPacking
+        Of discs.
+
+    Raises
+    ------
+    ValueError
+        For spheres.
+    """
+    checks.instance("packing", packing, JammedPacking)
+    if packing.dimension != 2:
+        checks.refuse("packing", "discs", f"{packing.count} spheres")
+    box = packing.box
+    figure = Figure(figsize=(SIZE, SIZE), layout="constrained")
+    axes = figure.add_subplot()
+    shifts = box * np.array(list(product((-1, 0, 1), repeat=2)))
+    centres = packing.centres % box
+    radii = packing.inflation * packing.radii
+    colours = np.where(packing.degrees > 0, BODY, LOOSE)
+    places = (centres[None] + shifts[:, None]).reshape(-1, 2)
+    widths = np.tile(2 * radii, len(shifts))
+    axes.add_collection(
+        EllipseCollection(
+            widths,
+            widths,
+            np.zeros(len(places)),
+            units="xy",
+            offsets=places,
+            offset_transform=axes.transData,
+            facecolors=np.tile(colours, len(shifts)),
+            edgecolors=EDGE,
+            linewidths=0.3,
+        )
+    )
+    first = centres[packing.pairs[:, 0]]
+    segments = np.stack([first, first + packing.vectors], axis=1)
+    largest = float(np.quantile(packing.forces, MOST_LARGEST)) if len(segments) else 1.0
+    thick = np.minimum(packing.forces / largest, 1.0) * WIDEST * np.sqrt(100 / packing.count)
+    axes.add_collection(
+        LineCollection(
+            (segments[None] + shifts[:, None, None]).reshape(-1, 2, 2).tolist(),
+            linewidths=np.tile(thick, len(shifts)).tolist(),
+            colors=PRESS,
+            capstyle="round",
+        )
+    )
+    span = -MARGIN * box, (1 + MARGIN) * box
+    axes.plot([0, box, box, 0, 0], [0, 0, box, box, 0], color="0.3", lw=0.8)
+    axes.set(xlim=span, ylim=span, aspect="equal")
+    axes.set_axis_off()
+    axes.set_title(
+        f"{packing.count} discs, density {packing.density:.4f}, {len(packing.pairs)} contacts, "
+        f"{len(packing.rattlers)} rattlers",
+        fontsize=10,
+    )
+    return figure

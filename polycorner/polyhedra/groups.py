@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Union
 
+from polycorner.checks import refuse
 from polycorner.formulas.expressions import as_expression
 from polycorner.formulas.families import Family
 from polycorner.formulas.functions import SmoothFunction
@@ -87,8 +88,7 @@ class _Collection:
                 raise ValueError(msg)
             return type(part)(*[self.named("", p, name or letter) for p in part.parts])
         if not isinstance(name, str):
-            msg = f"{self.argument}: expected names to be strings; got {name!r}"
-            raise TypeError(msg)
+            refuse(f"{self.argument}", "names to be strings", name, TypeError)
         if isinstance(part, SmoothFunction):
             return self._on_manifold(part, name)
         group = outermost(part) if self.branching else part

@@ -106,8 +106,9 @@ class WalkOptions(Checked):
             else:
                 checks.real(name, value, above=0)
         checks.real("turn", self.turn, below=math.pi / 2)
-        checks.real("first_step", self.first_step, above=self.shortest_step)
-        checks.real("longest_step", self.longest_step, least=self.first_step)
+        steps = self.shortest_step, self.first_step, self.longest_step
+        if not steps[0] < steps[1] <= steps[2]:
+            checks.refuse("shortest_step, first_step, longest_step", "ascending numbers", steps)
 
     @classmethod
     def careful(cls) -> Self:

@@ -15,7 +15,6 @@ from itertools import pairwise
 import numpy as np
 
 from polycorner.polyhedra.strata import stratum_of
-from polycorner.skeletons.borders import Border, Tip, balls_about, seeds_of
 from polycorner.skeletons.elements import Skeleton
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.incidences import (
@@ -30,13 +29,12 @@ from polycorner.skeletons.incidences import (
     positions_in,
     untold,
 )
-from polycorner.skeletons.nets import Net
+from polycorner.skeletons.nets import Border, Net, Tip, balls_about, seeds_of
 from polycorner.skeletons.parts import Completeness, Contact, Corner, Edge, Face
 from polycorner.skeletons.probing import Anchor
 from polycorner.skeletons.registry import FoundCorner
-from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.surfaces import Surface
-from polycorner.skeletons.vertex_figures import Ray
+from polycorner.skeletons.vertex_figures import Ray, Sector
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 

@@ -19,11 +19,11 @@ from polycorner.polyhedra.quotients import EvaluatedPoint, Sample
 from polycorner.skeletons.branches import MAX_SETS, Branches
 from polycorner.skeletons.dependence import dependent_at, follow_edge
 from polycorner.skeletons.folds import fold_figure
-from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import SingularPoint
 from polycorner.skeletons.spheres_about import SAMPLED, link_about
 from polycorner.skeletons.vertex_figures import (
     Ray,
+    Sector,
     VertexFigure,
     corner_rank,
     rounding,

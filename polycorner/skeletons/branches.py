@@ -40,8 +40,8 @@ from polycorner.polyhedra.cones import Rows, extreme_rays, null_space, rank
 from polycorner.polyhedra.faces import projected
 from polycorner.polyhedra.quotients import EvaluatedPoint
 from polycorner.skeletons.dependence import unit_hessians
-from polycorner.skeletons.sign_changes import sign_change
 from polycorner.skeletons.spheres_about import Link
+from polycorner.skeletons.walks import sign_change
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 

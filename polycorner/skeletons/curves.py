@@ -4,14 +4,15 @@ The end of an edge at a corner is named by two positions, those of the corner an
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from polycorner.checks import refuse
 from polycorner.polyhedra.faces import projected
 from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.symmetry import Relabelling
-from polycorner.skeletons.sign_changes import sign_change
-from polycorner.skeletons.walks import End
+from polycorner.skeletons.walks import End, sign_change
 from polycorner.spaces.manifold import Array
 from polycorner.values import Value
 
@@ -34,8 +35,7 @@ class Curve(Value):
 
     def __post_init__(self) -> None:
         if len(self.points) < 2:
-            msg = f"points: expected at least two points of an edge; got {len(self.points)}"
-            raise ValueError(msg)
+            refuse("points", "at least two points of an edge", len(self.points))
         super().__post_init__()
 
     @property
@@ -73,3 +73,18 @@ def _on_arc(quotient: Quotient, q: Array, curve: Curve, k: int) -> bool:
     if passed(0.0)[0] > 0 or passed(1.0)[0] < 0:
         return min(quotient.separation(q, p) for p in (start, end)) < same
     return quotient.separation(q, sign_change(passed)[1]) < same
+
+
+# -------------------------------------------------------------------------------------------- flags
+
+# An edge (its end at a corner, or its position) or an apex (its corner and sector), and the names
+# of a face beside it.
+Flag = tuple[str, Any, frozenset[str]]
+
+
+@dataclass(frozen=True)
+class FaceCrossing:
+    """A straight way across a face, from one of its edges to another."""
+
+    start: Flag
+    stop: Flag

@@ -17,27 +17,30 @@ from itertools import chain, combinations, islice
 
 import numpy as np
 
-from polycorner.lookahead import Lookahead
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.faces import HeldPoint, projected
 from polycorner.polyhedra.quotients import VICINITY, EvaluatedPoint, Quotient, Sample
 from polycorner.progress import Progress, silent
 from polycorner.searches import Clock, Ending, Task, Told, work_through
 from polycorner.skeletons.branched_corners import branched_figure
-from polycorner.skeletons.curves import Curve
-from polycorner.skeletons.flags import FaceCrossing, Flag
+from polycorner.skeletons.curves import Curve, FaceCrossing, Flag
 from polycorner.skeletons.folds import fold_figure
 from polycorner.skeletons.parts import Completeness
 from polycorner.skeletons.probing import ISLAND, ROUNDS, Anchor, Prober
-from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import singular_point, singular_points
 from polycorner.skeletons.spheres_about import SAMPLED, Link, link_about
 from polycorner.skeletons.states import Budget, SearchState, copied
 from polycorner.skeletons.tracing import FIGURE, EdgeTracer
-from polycorner.skeletons.vertex_figures import Ray, VertexFigure, faces_beside, singular_rays
+from polycorner.skeletons.vertex_figures import (
+    Ray,
+    Sector,
+    VertexFigure,
+    faces_beside,
+    singular_rays,
+)
 from polycorner.skeletons.walks import End, follow
 from polycorner.spaces.manifold import Array
-from polycorner.workers import Workers
+from polycorner.workers import Lookahead, Workers
 
 # Random directions of a descent.
 DIRECTIONS = 6

@@ -44,8 +44,7 @@ from polycorner.polyhedra.cones import Rows
 from polycorner.polyhedra.faces import projected
 from polycorner.polyhedra.quotients import EvaluatedPoint, Sample
 from polycorner.skeletons.dependence import curvature, dependent_at
-from polycorner.skeletons.sectors import Sector
-from polycorner.skeletons.vertex_figures import Ray, VertexFigure
+from polycorner.skeletons.vertex_figures import Ray, Sector, VertexFigure
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 

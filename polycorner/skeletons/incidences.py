@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from polycorner.polyhedra.symmetry import Relabelling, generators
+from polycorner.skeletons.curves import Flag as NamedFlag
 from polycorner.skeletons.explorer import Explorer
-from polycorner.skeletons.flags import Flag as NamedFlag
 from polycorner.skeletons.registry import FoundCorner
-from polycorner.skeletons.sectors import Sector
+from polycorner.skeletons.vertex_figures import Sector
 
 # Sets of functions are bits of integers here: a fiftieth of the memory of sets of names.
-# An edge or an apex, as in :data:`~polycorner.skeletons.flags.Flag`, and the functions that vanish
+# An edge or an apex, as in :data:`~polycorner.skeletons.curves.Flag`, and the functions that vanish
 # on a face beside it, as bits.
 Flag = tuple[str, Any, int]
 

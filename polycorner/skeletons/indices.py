@@ -25,8 +25,7 @@ import numpy as np
 
 from polycorner.polyhedra.faces import HeldPoint
 from polycorner.polyhedra.symmetry import Element
-from polycorner.skeletons.borders import Border, Tip, balls_about, seeds_of
-from polycorner.skeletons.nets import LEVELS, Net
+from polycorner.skeletons.nets import LEVELS, Border, Net, Tip, balls_about, seeds_of
 from polycorner.skeletons.spheres_about import link_about
 from polycorner.skeletons.surfaces import Height, Surface
 from polycorner.skeletons.walks import End, follow

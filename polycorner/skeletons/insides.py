@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from polycorner.lookahead import in_order
 from polycorner.polyhedra.cones import unit_rows
 from polycorner.polyhedra.quotients import Quotient
 from polycorner.progress import Progress
@@ -33,10 +32,10 @@ from polycorner.skeletons.incidences import (
     joins_of,
     mask_of,
 )
-from polycorner.skeletons.sectors import Sector
 from polycorner.skeletons.singularities import singular_point
+from polycorner.skeletons.vertex_figures import Sector
 from polycorner.spaces.manifold import Array
-from polycorner.workers import Shared, Workers
+from polycorner.workers import Shared, Workers, in_order
 
 Positions = NDArray[np.intp]
 Mask = NDArray[np.bool_]

@@ -10,9 +10,9 @@ import numpy as np
 from polycorner.polyhedra.cones import null_space, unit_rows
 from polycorner.polyhedra.quotients import Quotient
 from polycorner.polyhedra.strata import LocalType, Stratum
-from polycorner.skeletons.borders import Border
 from polycorner.skeletons.dependence import held_at
 from polycorner.skeletons.indices import face_euler_characteristic
+from polycorner.skeletons.nets import Border
 from polycorner.skeletons.walks import End
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked, cached_property

@@ -8,8 +8,7 @@ import numpy as np
 
 from polycorner import checks
 from polycorner.polyhedra.quotients import Quotient
-from polycorner.skeletons.curves import Curve, EdgeEnd
-from polycorner.skeletons.flags import FaceCrossing, Flag
+from polycorner.skeletons.curves import Curve, EdgeEnd, FaceCrossing, Flag
 from polycorner.skeletons.probing import Anchor, Patch
 from polycorner.skeletons.registry import FoundCorner
 from polycorner.spaces.manifold import Array

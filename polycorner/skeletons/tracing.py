@@ -14,7 +14,6 @@ from itertools import chain, islice
 
 import numpy as np
 
-from polycorner.lookahead import Lookahead
 from polycorner.polyhedra.faces import HeldPoint, projected
 from polycorner.polyhedra.quotients import EvaluatedPoint, Quotient, Sample
 from polycorner.polyhedra.symmetry import Relabelling, renamed
@@ -30,7 +29,7 @@ from polycorner.skeletons.registry import (
 from polycorner.skeletons.vertex_figures import Ray, VertexFigure
 from polycorner.skeletons.walks import End, Walk, follow
 from polycorner.spaces.manifold import Array
-from polycorner.workers import Shared
+from polycorner.workers import Lookahead, Shared
 
 # Most steps along an edge to a point near its end.
 INWARD = 60

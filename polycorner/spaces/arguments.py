@@ -38,16 +38,14 @@ def _first_bad(array: Array) -> str:
 def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
     """Return distinct identifiers, given in one string or a sequence."""
     if not isinstance(names, Iterable):
-        msg = f"names: expected a string or a sequence of strings; got {names!r}"
-        raise TypeError(msg)
+        refuse("names", "a string or a sequence of strings", names, TypeError)
     parsed = tuple(names.replace(",", " ").split()) if isinstance(names, str) else tuple(names)
     if not parsed:
         msg = "names: expected at least one coordinate name; got none"
         raise ValueError(msg)
     for name in parsed:
         if not isinstance(name, str) or not _IDENTIFIER.fullmatch(name):
-            msg = f"names: expected identifiers; got {name!r}"
-            raise ValueError(msg)
+            refuse("names", "identifiers", name)
     repeated = [name for name, count in Counter(parsed).items() if count > 1]
     if repeated:
         msg = f"names: expected distinct names; got {', '.join(repeated)} more than once"
@@ -85,8 +83,7 @@ def positive(argument: str, values: Any, n: int, *, finite: bool) -> tuple[float
     """Return ``n`` positive numbers; infinities may be among them unless ``finite``."""
     array = reals(argument, values)
     if array.shape != (n,):
-        msg = f"{argument}: expected {n} numbers, one for each coordinate; got {values!r}"
-        raise ValueError(msg)
+        refuse(argument, f"{n} numbers, one for each coordinate", values)
     numbers = tuple(array.tolist())
     if not all(v > 0 and (v < math.inf or not finite) for v in numbers):
         kind = "positive finite numbers" if finite else "positive numbers or inf"

@@ -298,8 +298,7 @@ class Manifold(Geometry, Printed):
     def __pow__(self, copies: int) -> "Manifold":
         """Return ``X x ... x X``; names get the suffixes 1 to ``copies``."""
         if not isinstance(copies, int) or copies < 1:
-            msg = f"copies: expected a positive whole number; got {copies!r}"
-            raise ValueError(msg)
+            refuse("copies", "a positive whole number", copies)
         return _product((self,) * copies)
 
     @shown
@@ -334,15 +333,11 @@ class Manifold(Geometry, Printed):
         """
         if isinstance(q, Mapping):
             if set(q) != set(self.names):
-                msg = (
-                    f"{argument}: expected the coordinates {', '.join(self.names)}; got {sorted(q)}"
-                )
-                raise ValueError(msg)
+                refuse(argument, f"the coordinates {', '.join(self.names)}", sorted(q))
             q = [q[name] for name in self.names]
         array = self.points(q, argument)
         if array.ndim != 1:
-            msg = f"{argument}: expected one point of shape ({self.size},); got {array.shape}"
-            raise ValueError(msg)
+            refuse(argument, f"one point of shape ({self.size},)", array.shape)
         return self.placed(array, argument) if self.factors else array
 
     def wrap(self, q: ArrayLike) -> Array:

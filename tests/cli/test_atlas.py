@@ -10,8 +10,8 @@ from atlas_commands import answer, fits_together, run, same_atlas
 
 from polycorner import skeleton
 from polycorner.models.pinball import Pinball
+from polycorner.models.planar import Tutorial
 from polycorner.models.spheres import SphereCluster
-from polycorner.models.tutorial import Tutorial
 
 SEARCHES = ("dyad", "spheres", "tutorial", "pinball")
 MODELS = (*SEARCHES, "disks")

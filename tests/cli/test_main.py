@@ -7,6 +7,8 @@ import re
 import shlex
 import subprocess
 import sys
+from importlib import metadata
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import click
@@ -14,8 +16,11 @@ import commands
 import pytest
 from command_tree import EVERY, LEAVES, QUICK, one_line, options
 
+from polycorner.cli import lazy
 from polycorner.cli import main as entry
+from polycorner.cli.atlas import atlas
 from polycorner.cli.main import EXIT_CODES, cli
+from polycorner.formulas.cache import cache_folder
 
 ROOT = Path(entry.__file__).parents[2]
 # Tested in files of their own.
@@ -282,3 +287,90 @@ def test_a_reader_that_goes_away_ends_it_silently(words, form):
     assert started.stderr.read() == ""
     assert started.wait() == 141
     started.stderr.close()
+
+
+# -------------------------------------------------------------------------------------------- cache
+
+
+@pytest.fixture
+def folder(monkeypatch, tmp_path):
+    """A cache of its own with two files in it."""
+    chosen = tmp_path / "cache"
+    monkeypatch.setenv("POLYCORNER_CACHE_DIR", str(chosen))
+    (cache_folder() / "kernels").mkdir()
+    (chosen / "kernels" / "a.o").write_bytes(b"12345")
+    (chosen / "atlas-0.json").write_text("{}")
+    return chosen
+
+
+def test_folder_and_size_are_shown(capsys, folder):
+    code, out, err = commands.run(capsys, "cache")
+    assert (code, err) == (0, "")
+    assert str(folder) in out
+    assert "2 files" in out
+    found = commands.answer(capsys, "cache")
+    assert found == {"folder": str(folder), "files": 2, "bytes": 7, "cleared": False}
+
+
+def test_clearing_empties_the_folder(capsys, folder):
+    code, out, _ = commands.run(capsys, "cache", "--clear", "--json")
+    assert (code, json.loads(out)["files"], json.loads(out)["cleared"]) == (0, 2, True)
+    assert list(folder.iterdir()) == []
+    assert commands.answer(capsys, "cache")["files"] == 0
+
+
+# ------------------------------------------------------------------------------------- applications
+
+COMMANDS = "polycorner.commands"
+
+
+@pytest.fixture
+def registering(monkeypatch):
+    """Let applications register given commands, as names and values of entry points."""
+    own = {"completion": cli.commands["completion"]}
+    monkeypatch.setattr(cli, "commands", own)  # without those that were loaded before
+    monkeypatch.delitem(atlas.commands, "dyad", raising=False)
+
+    lazy.registered.cache_clear()
+
+    def register(**values):
+        points = [EntryPoint(name, value, COMMANDS) for name, value in values.items()]
+        found = {COMMANDS: points}
+        monkeypatch.setattr(metadata, "entry_points", lambda group: found.get(group, []))
+
+    yield register
+    lazy.registered.cache_clear()
+
+
+def test_commands_are_registered(capsys, registering):
+    registering(tidy="polycorner.cli.cache:cache")
+    assert "\n  tidy " in commands.run(capsys, "--help")[1]
+    assert commands.run(capsys, "tidy", "--help")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "why"),
+    [
+        ("nosuch.package:drum", "cannot be loaded (ModuleNotFoundError"),
+        ("polycorner.cli.cache:nosuch", "cannot be loaded (AttributeError"),
+        ("polycorner.cli.cache:__name__", "expected a command of click"),
+    ],
+)
+def test_an_application_that_cannot_be_loaded_is_one_sentence(capsys, registering, value, why):
+    registering(broken=value)
+    code, out, err = commands.run(capsys, "broken", "this", "--count", "3")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith("polycorner: broken: ")
+    assert why in err
+    code, out, _ = commands.run(capsys, "--help")
+    assert code == 0
+    assert re.search(r"broken +\(cannot be loaded\)", out)
+
+
+@pytest.mark.parametrize("words", [("drum",), ("atlas", "dyad")])
+def test_an_environment_older_than_the_applications_is_said_to_be(capsys, registering, words):
+    registering()
+    code, out, err = commands.run(capsys, *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"polycorner: No such command '{words[-1]}'; no application")
+    assert "make env" in err

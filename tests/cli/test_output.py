@@ -51,24 +51,24 @@ def test_numbers_that_json_lacks_are_null():
     )
 
 
-def test_an_answer_is_printed_before_its_files_are_written(capsys):
-    def write():
+def test_an_answer_is_printed_before_its_files_are_written(capsys, tmp_path):
+    def write(_):
         assert capsys.readouterr().out == "the answer\n"
         raise OSError(28, "No space left on device")
 
     with pytest.raises(OSError, match="No space"):
-        deliver({}, lambda: "the answer", write, as_json=False)
+        deliver({}, lambda: "the answer", write, as_json=False, out=tmp_path)
 
 
-def test_files_are_written_where_the_answer_cannot_be_printed(monkeypatch):
+def test_files_are_written_where_the_answer_cannot_be_printed(monkeypatch, tmp_path):
     def closed(*_, **__):
         raise BrokenPipeError
 
     monkeypatch.setattr(click, "echo", closed)
     written = []
     with pytest.raises(BrokenPipeError):
-        deliver({}, lambda: "the answer", lambda: written.append("file") or [], as_json=False)
-    assert written == ["file"]
+        deliver({}, lambda: "x", lambda f: written.append(f) or [], as_json=False, out=tmp_path)
+    assert written == [tmp_path]
 
 
 def test_a_bar_shows_what_is_done_and_how_long_it_takes(capsys, monkeypatch):

@@ -9,6 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import smooth_expressions, together
 
+from polycorner.formulas.cache import sources_digest
+from polycorner.formulas.linking import linked
+
 pytestmark = pytest.mark.usefixtures("kernels_elsewhere")
 
 x, y = sp.symbols("x y", real=True)
@@ -202,3 +205,35 @@ def test_exact_constants_are_rounded_once():
     values = exact.evaluate(np.array([0.0]), 0)[0]
     with mpmath.workdps(40):
         assert values.tolist() == [0.1, float(mpmath.pi), float(mpmath.e)]
+
+
+# -------------------------------------------------------------------------------------- compilation
+
+
+def test_python_cannot_call_what_is_only_linked():
+    twice = linked()(lambda x: 2 * x)
+    with pytest.raises(SystemError):
+        twice(5)
+
+
+def test_the_digest_depends_on_names_and_bytes(tmp_path, monkeypatch):
+    folder = tmp_path / "leaves"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "leaf.py").write_text("LEAF = 1")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    digests = [sources_digest("leaves")]
+    (folder / "leaf.py").write_text("LEAF = 2")
+    digests.append(sources_digest("leaves"))
+    (folder / "leaf.py").rename(folder / "twig.py")
+    digests.append(sources_digest("leaves"))
+    (folder / "other.py").touch()
+    digests.append(sources_digest("leaves"))
+    assert len(set(digests)) == 4
+    assert sources_digest("leaves", without=("other.py",)) == digests[2]
+    assert sources_digest("leaves", only=("__init__.py", "twig.py")) == digests[2]
+
+
+def test_only_packages_have_a_digest():
+    with pytest.raises(ValueError, match="package: expected the name of an importable package"):
+        sources_digest("json.decoder")

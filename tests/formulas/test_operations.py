@@ -18,8 +18,7 @@ from polycorner.formulas.operations import OPERATIONS
 from polycorner.formulas.programs import Graph
 from polycorner.intervals.balls import ANALYTIC, PARTIALS, ball, bounds, operations, precision
 from polycorner.intervals.boxes import BoxFunctions
-from polycorner.minimisation.jets import function_series
-from polycorner.minimisation.series import ring
+from polycorner.minimisation.jets import function_series, ring
 from polycorner.proofs.checker import operations as checker
 
 M = Manifold.euclidean("x")

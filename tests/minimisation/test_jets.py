@@ -6,8 +6,7 @@ import sympy as sp
 
 from polycorner import Manifold
 from polycorner.formulas.functions import SmoothFunction
-from polycorner.minimisation.jets import NotAnalyticError, function_series
-from polycorner.minimisation.series import EPSILON, ring
+from polycorner.minimisation.jets import EPSILON, NotAnalyticError, function_series, ring
 
 pytestmark = pytest.mark.filterwarnings("ignore::polycorner.errors.NonsmoothWarning")
 M = Manifold.euclidean("x y")

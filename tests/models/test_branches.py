@@ -1,8 +1,12 @@
 """Mechanical problems whose equilibria over a parameter have closed forms."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 import sympy
+from elsewhere import called
 from numpy.polynomial import Polynomial
 from scipy.optimize import brentq
 from sympy import cos, sin, sqrt
@@ -10,6 +14,8 @@ from sympy import cos, sin, sqrt
 from polycorner import Manifold, Polyhedron, SmoothFunction, minimise, stationary_on
 from polycorner.branches import branches
 from polycorner.formulas import Family
+from polycorner.models import Pinball, SphereCluster, TorusDisks, Tutorial
+from polycorner.models.wells.wells import Well
 
 
 def problem(manifold, functions, energy, parameter, value, equations=()):
@@ -232,3 +238,23 @@ def test_beam_of_a_thousand_nodes_on_a_floor():
     d = branches(start, "P", (force - 0.6, force + 0.6))
     assert_events(d, [("OPENS", j / 2 + 1) for j in (lifted - 1, lifted)])
     assert all(arc.stable for arc in d.arcs)
+
+
+# ------------------------------------------------------------------------------------------- values
+
+MODELS = (Pinball(), SphereCluster(4), TorusDisks(2), Tutorial(), Well(0.0, 1.0))
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: type(model).__name__)
+def test_a_model_survives_pickling_after_it_was_used(model):
+    points = np.random.default_rng(0).normal(size=(3, model.polyhedron.dimension))
+    values = model.polyhedron.values(points)
+    for again in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):
+        assert again == model
+        np.testing.assert_array_equal(again.polyhedron.values(points), values)
+
+
+def test_a_spawned_process_computes_the_same():
+    model = TorusDisks(3, "hexagonal")
+    q = model.starts(np.random.default_rng(0), 4)
+    np.testing.assert_array_equal(called(model.radius, q), model.radius(q))

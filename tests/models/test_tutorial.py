@@ -11,8 +11,7 @@ from scipy.optimize import root
 from strategies import directions, reals
 
 from polycorner import Manifold, Polyhedron, certify, minimise, stratum_at
-from polycorner.models.planar import MAX_TRIES, Wall, meeting_corners, uniform_points
-from polycorner.models.tutorial import Tutorial
+from polycorner.models.planar import MAX_TRIES, Tutorial, Wall, meeting_corners, uniform_points
 from polycorner.polyhedra import LocalType
 
 REGION = Tutorial()

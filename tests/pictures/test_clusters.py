@@ -25,7 +25,7 @@ from polycorner.pictures.clusters import (
     _turned,
     draw_clusters,
 )
-from polycorner.pictures.motion_strips import draw_motion
+from polycorner.pictures.motion_films import draw_motion
 from polycorner.pictures.style import save
 
 DPI = 150  # of files that are saved

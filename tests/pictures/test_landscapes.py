@@ -1,18 +1,21 @@
 """Figures of landscapes: trees of known shape, maps of the plane, films of routes."""
 
+import math
 from math import inf
 
 import numpy as np
 import pytest
 from landscape_values import WELLS, a_pass, double_well, minimum, random_tree, route, tree
+from matplotlib.collections import LineCollection
 from PIL import Image
 
 from polycorner import Manifold, Polyhedron
 from polycorner.landscapes import Landscape, Route
 from polycorner.minimisation.problem import pose
-from polycorner.pictures import draw_landscape, draw_landscape_map, film_route, save
-from polycorner.pictures.route_films import evenly
+from polycorner.pictures import draw_barcode, draw_landscape, draw_landscape_map, film_route, save
+from polycorner.pictures.landscape_maps import evenly
 from polycorner.pictures.trees import tree_of
+from polycorner.polyhedra import Bar, Nerve
 
 
 def components(energies, joins, height):
@@ -218,3 +221,23 @@ def test_a_film_in_another_format_is_refused(tmp_path):
         film_route(landscape, route([[0, 0], [1, 0]]), tmp_path / "way.avi", placements)
     with pytest.raises(ValueError, match=r"^frames: expected "):
         film_route(landscape, route([[0, 0], [1, 0]]), tmp_path / "w.gif", placements, frames=1)
+
+
+# ----------------------------------------------------------------------------------------- barcodes
+
+
+def test_bars_go_from_birth_to_death():
+    bars = (Bar(0, math.inf, -math.inf), Bar(0, 2.0, 1.0), Bar(1, 1.5, -math.inf))
+    (axes,) = draw_barcode(Nerve(np.zeros(0), np.zeros(0), bars), "size").axes
+    drawn = [c for c in axes.collections if isinstance(c, LineCollection)]
+    ends = [segment[:, 0].tolist() for some in drawn for segment in some.get_segments()]
+    left, right = axes.get_xlim()
+    assert ends == [[left, right], [1.0, 2.0], [left, 1.5]]
+    assert left < 1
+    assert right > 2
+    assert [line.get_xdata()[0] for line in axes.lines] == [2.0, 1.5, 1.0]
+
+
+def test_what_is_refused():
+    with pytest.raises(TypeError, match="nerve: expected a Nerve"):
+        draw_barcode(1)

@@ -6,7 +6,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 from polycorner import AllOf, AnyOf, Manifold, Polyhedron, skeleton
-from polycorner.models.tutorial import Tutorial
+from polycorner.models.planar import Tutorial
 from polycorner.pictures.regions import MINIMA, SHADE, draw_region
 from polycorner.pictures.style import save
 

@@ -15,9 +15,8 @@ from polycorner.skeletons.branched_corners import branched_figure
 from polycorner.skeletons.branches import common_zeros
 from polycorner.skeletons.explorer import Explorer
 from polycorner.skeletons.folds import fold_figure
-from polycorner.skeletons.sectors import Ranks
 from polycorner.skeletons.singularities import SingularPoint
-from polycorner.skeletons.vertex_figures import corner_rank
+from polycorner.skeletons.vertex_figures import Ranks, corner_rank
 from polycorner.tolerances import DEFAULT
 
 few = settings(max_examples=settings.default.max_examples // 8)

@@ -64,14 +64,13 @@ FUNCTIONS = {
     "named": ("study",),
     "path": ("store", "read", "module"),  # a sentence about a file begins with its name
     "edges": ("budget",),
-    "shortest_step": ("first_step",),  # which may not be shorter
     "scale": ("path",),  # a mesh of which nothing is left
     "potential": ("V",),
     "kinetic": ("T",),
     "polyhedron": ("q", "load"),  # of another dimension than the other arguments
     "parameters": ("f",),  # the formula is named where a symbol has no value
 }
-PATHS = ("path", "folder", "store")  # the system's own errors name files
+PATHS = ("path", "folder", "store", "keep", "table")  # the system's own errors name files
 SLOW = {
     name
     for name in RECIPES.keys() | VALUES.keys()

@@ -24,8 +24,8 @@ from polycorner import (
     sweeps,
 )
 from polycorner.dumbbells import pictures as drum_pictures
+from polycorner.dumbbells.dynamics.dyads import Steady
 from polycorner.dumbbells.dynamics.singles import Mean
-from polycorner.dumbbells.dynamics.steady import Steady
 from polycorner.models.wells import holding
 from polycorner.models.wells.wells import KINDS, Well
 

@@ -1,17 +1,15 @@
 """``polycorner atlas dyad``: corners, edges and faces of the placements of a pair."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import click
-
 from polycorner.cli import (
     RESUMING,
     Begin,
-    GroupedCommand,
+    command,
+    counts_by_dimension,
     examples,
     fail,
     given,
@@ -23,10 +21,7 @@ from polycorner.dumbbells.cli.options import GROUP, chosen_pair, pair_options, p
 UNMATCHED = "relabelling leads to corners that are not in this section: not counted up to it"
 
 
-@click.command(
-    cls=GroupedCommand,
-    epilog=examples("atlas dyad --plane", "atlas dyad --heading 5 --out out") + RESUMING,
-)
+@command(epilog=examples("atlas dyad --plane", "atlas dyad --heading 5 --out out") + RESUMING)
 @pair_options
 @option("--plane", is_flag=True, help="The developed plane, like --drum inf.", group=GROUP)
 @option(
@@ -52,11 +47,11 @@ def dyad(plane: bool, heading: float, begin: Begin, **options: float) -> None:
     search = begin("dyad", parameters(pair) | {"heading_deg": heading})
     found = search.run(polyhedron, lambda rng: pair_starts(pair, rng, angle), pair.symmetry)
     whole = PairAtlas(pair, found, None if pair.is_plane else angle)
-    extra: dict[str, Any] = {"components": _counts(whole.components)}
+    extra: dict[str, Any] = {"components": counts_by_dimension(whole.components)}
     try:
         if search.finished:
-            extra["components_ordered"] = _counts(whole.components_ordered)
-            extra["components_unordered"] = _counts(whole.components_unordered)
+            extra["components_ordered"] = counts_by_dimension(whole.components_ordered)
+            extra["components_unordered"] = counts_by_dimension(whole.components_unordered)
     except ValueError:
         search.drawn = False
         found = replace(found, notes=(*found.notes, UNMATCHED))
@@ -76,7 +71,3 @@ def dyad(plane: bool, heading: float, begin: Begin, **options: float) -> None:
         ]
 
     search.finish(answer, draw)
-
-
-def _counts(found: Mapping[int, int]) -> dict[str, int]:
-    return {str(dimension): count for dimension, count in sorted(found.items())}

@@ -7,9 +7,9 @@ import click
 
 from polycorner.cli import (
     Asked,
-    GroupedCommand,
     Vary,
     branch_options,
+    command,
     examples,
     fail,
     followed,
@@ -31,8 +31,7 @@ RATES = {
 }
 
 
-@click.command(
-    cls=GroupedCommand,
+@command(
     epilog=examples(
         "branches dyad --vary rod=2:2.95 --json", "branches dyad --vary length=8:20 --out out"
     ),
@@ -69,8 +68,7 @@ def dyad(
     with working("following equilibria", "arcs") as progress:
         import numpy as np
 
-        from polycorner.dumbbells.statics.minima import dyad_corner
-        from polycorner.dumbbells.statics.pair_minima import energy_symmetry
+        from polycorner.dumbbells.statics.minima import dyad_corner, energy_symmetry
 
         corner, symmetry = dyad_corner(pair, "R").certificate, energy_symmetry(pair)
         varied = corner.problem.parameter_values.keys() & RATES[name].keys()

@@ -266,13 +266,13 @@ def _finish(
 ) -> None:  # fmt: skip
     """Print the answer, write the files, and end the process if the run was stopped."""
 
-    def write() -> Iterator[Path]:
+    def write(_: Path) -> Iterator[Path]:
         if out is not None:
             yield from _write(run, answer, out)
         if film is not None:
             yield _write_film(run, film)
 
-    deliver(answer, lambda: shown(drum_sheet(answer)), write, as_json=as_json)
+    deliver(answer, lambda: shown(drum_sheet(answer)), write, as_json=as_json, out=out or film)
     if not run.finished:
         unfinished(Path(checkpoint.folder))
         raise click.exceptions.Exit(130)

@@ -43,13 +43,11 @@ def dyad(as_json: bool, out: Path | None, **options: float) -> None:
         entries = dyad_minima(pair)
         answer = _answer(pair, entries)
 
-    def write() -> list[Path]:
-        if out is None:
-            return []
+    def write(folder: Path) -> list[Path]:
         with working("drawing"):
-            return _write(pair, entries, answer, out)
+            return _write(pair, entries, answer, folder)
 
-    deliver(answer, lambda: shown(_sheet(pair, entries, answer)), write, as_json=as_json)
+    deliver(answer, lambda: shown(_sheet(pair, entries, answer)), write, as_json=as_json, out=out)
 
 
 def _answer(pair: "DumbbellPair", entries: "Minima") -> dict[str, Any]:

@@ -4,11 +4,9 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from polycorner.cli import (
-    GroupedCommand,
     Telling,
+    command,
     examples,
     fail,
     landscape_options,
@@ -24,9 +22,7 @@ if TYPE_CHECKING:
     from polycorner.landscapes import Landscape
 
 
-@click.command(
-    cls=GroupedCommand, epilog=examples("landscape dyad --out out", "landscape dyad --rod 1 --json")
-)
+@command(epilog=examples("landscape dyad --out out", "landscape dyad --rod 1 --json"))
 @pair_options
 @landscape_options
 def dyad(limits: dict[str, Any], as_json: bool, out: Path | None, **options: float) -> None:
@@ -67,7 +63,7 @@ def _energy(model: "RelativePlacements", height: float) -> float:
 
 def names(model: "RelativePlacements", found: "Landscape") -> list[str]:
     """Return the paper's names of minima: ``G`` is apart, others are held by contacts."""
-    from polycorner.dumbbells.statics.pair_minima import NAMES
+    from polycorner.dumbbells.statics.minima import NAMES
 
     told = []
     for one in found.minima:

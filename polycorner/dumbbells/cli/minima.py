@@ -3,17 +3,14 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from polycorner.cli import GroupedCommand, examples, prepare, report_minima, start_options, working
+from polycorner.cli import command, examples, prepare, report_minima, start_options, working
 from polycorner.dumbbells.cli.options import chosen_pair, pair_options, parameters
 
 if TYPE_CHECKING:
     from polycorner.minimisation import Certificate
 
 
-@click.command(
-    cls=GroupedCommand,
+@command(
     epilog=examples("minima dyad --starts 300", "minima dyad --rod 0.3 --starts 2000 --json"),
 )
 @pair_options
@@ -28,7 +25,7 @@ def dyad(starts: int, seed: int, as_json: bool, out: Path | None, **options: flo
     with working("minimising", "starts") as progress:
         import numpy as np
 
-        from polycorner.dumbbells.statics.pair_minima import kind_of, pair_minima
+        from polycorner.dumbbells.statics.minima import kind_of, pair_minima
 
         found = pair_minima(pair, starts=starts, rng=seed, progress=progress)
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from polycorner.cli import Command, fail, option, tell
+from polycorner.cli import Command, added, naming, option, tell
 
 if TYPE_CHECKING:
     from polycorner.dumbbells import DumbbellPair
@@ -20,10 +20,15 @@ PARAMETERS = (
 
 def pair_options(function: Command) -> Command:
     """Add the options that describe a pair of dumbbells."""
-    for name, _, default, words in reversed(PARAMETERS):
-        flag = f"--{name.replace('_', '-')}"
-        function = option(flag, type=float, default=default, help=words, group=GROUP)(function)
-    return function
+    every = (
+        option(_flag(name), type=float, default=default, help=words, group=GROUP)
+        for name, _, default, words in PARAMETERS
+    )
+    return added(function, *every)
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def chosen_pair(values: dict[str, float]) -> "DumbbellPair":
@@ -31,15 +36,8 @@ def chosen_pair(values: dict[str, float]) -> "DumbbellPair":
     tell("pair: " + ", ".join(f"{name} = {value:g}" for name, value in values.items()))
     from polycorner.dumbbells import DumbbellPair
 
-    try:
+    with naming({field: _flag(name) for name, field, _, _ in PARAMETERS}):
         return DumbbellPair(**{field: values[name] for name, field, _, _ in PARAMETERS})
-    except (ValueError, TypeError) as error:
-        message = str(error)
-        for name, field, _, _ in PARAMETERS:
-            if message.startswith(f"{field}:"):
-                message = f"--{name.replace('_', '-')}" + message.removeprefix(field)
-                break
-        fail(message)
 
 
 def parameters(pair: "DumbbellPair") -> dict[str, Any]:

@@ -14,6 +14,7 @@ from polycorner.cli import (
     option,
     output_options,
     prepare,
+    read_interval,
     shown,
     working,
     write_answer,
@@ -78,11 +79,13 @@ def prove(
             "box": {name: list(sides) for name, sides in region.items()},
             **_answer(proof),
         }
-
-    def write() -> list[Path]:
-        return [] if out is None else _write(proof, answer, out)
-
-    deliver(answer, lambda: shown(_sheet(answer, proof)), write, as_json=as_json)
+    deliver(
+        answer,
+        lambda: shown(_sheet(answer, proof)),
+        lambda folder: _write(proof, answer, folder),
+        as_json=as_json,
+        out=out,
+    )
 
 
 def _sheet(answer: dict[str, Any], proof: "Proof") -> "Sheet":
@@ -103,16 +106,12 @@ def _sheet(answer: dict[str, Any], proof: "Proof") -> "Sheet":
 def _region(boxes: tuple[str, ...]) -> dict[str, tuple[float, float]]:
     region: dict[str, tuple[float, float]] = {}
     for written in boxes:
-        name, _, sides = written.partition("=")
-        low, _, high = sides.partition(":")
+        name, low, high = read_interval("--box", written, "t=1.4:1.6")
         if name not in BOXES:
             fail(f"--box: expected t or l, as in t=1.4:1.6; got {written!r}")
         if BOXES[name] in region:
             fail(f"--box: expected one for {name}; got another one, {written!r}")
-        try:
-            region[BOXES[name]] = (float(low), float(high))
-        except ValueError:
-            fail(f"--box: expected two numbers, as in t=1.4:1.6; got {written!r}")
+        region[BOXES[name]] = low, high
     return region
 
 

@@ -11,6 +11,7 @@ import click
 from polycorner.cli import (
     Command,
     GroupedCommand,
+    added,
     config_option,
     examples,
     fail,
@@ -58,18 +59,19 @@ def view() -> None:
 
 def serving_options(function: Command) -> Command:
     """Add ``--port``, ``--host``, ``--no-browser`` and the general options."""
-    for add in (
-        option(
-            "--no-browser", is_flag=True, group="Server", help="Print the address, open nothing."
-        ),
-        option("--host", default=HOST, group="Server", help="Address to listen on."),
+    return added(
+        function,
         option(
             "--port", type=click.IntRange(0, 65535), default=PORT, group="Server",
             help="Port; 0 for any that is free.",
         ),
-    ):  # fmt: skip
-        function = add(function)
-    return verbosity_options(config_option(function))
+        option("--host", default=HOST, group="Server", help="Address to listen on."),
+        option(
+            "--no-browser", is_flag=True, group="Server", help="Print the address, open nothing."
+        ),
+        config_option,
+        verbosity_options,
+    )  # fmt: skip
 
 
 out_option = option(

@@ -1,4 +1,4 @@
-"""Dyads driven by the rotating drum: their headings, climbing and lifetimes.
+"""Dyads driven by the rotating drum: headings, climbing, lifetimes, and what turns them.
 
 Nested pairs start at chosen headings and move under noise, many in one simulation, far apart from
 each other.  Their heading is compared with the minimiser of the energy, in which friction does not
@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from polycorner.dumbbells.drum import DumbbellDrum, drum_of
+from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum, drum_of
 from polycorner.dumbbells.dynamics.pairs import DumbbellLengths, chirality, gaps
-from polycorner.dumbbells.dynamics.singles import APART
+from polycorner.dumbbells.dynamics.singles import APART, Mean
 from polycorner.dumbbells.formulas import CONTACTS
 from polycorner.dumbbells.pair import Chirality
 from polycorner.motion import Noise, Solver, Trajectory, simulate
@@ -260,3 +260,197 @@ def minimiser_heading(drum: DumbbellDrum, *, azimuth: float = 0.0) -> float:
         start = start + azimuth * np.array([1, 0, 0, 1, 0, 0])
     found = minimise(domain, pair.energy, start)
     return float(np.degrees(pair.heading(found.point)).mean())
+
+
+# ----------------------------------------------------------------- turning by weight and by impacts
+
+# A nested pair of heading ``theta`` is two parallel dumbbells, ``p = r + t`` across and ``s = l -
+# sqrt(4 r^2 - p^2)`` along their axes apart. Its weight turns it towards the heading of least
+# energy, as far as noise overcomes sliding friction. The higher dumbbell rolls against the lower
+# one, and an impact at their inner ends turns both the same way: to more positive headings in
+# right-handed pairs. This ends where both are equally high; beyond, the weight parts them.
+
+FLAT = 1e7  # mm: radius of a drum that is as good as a plane
+CONTACT = 1e-5  # mm between dumbbells before an impact
+STEPS = 60  # in the time for which the dumbbells slide
+
+
+def offsets(drum: DumbbellDrum) -> tuple[float, float]:
+    """Return ``p`` and ``s`` of a nested pair, its dumbbells' distance across and along, in mm."""
+    _, along, across = drum.pair.plane_corner()
+    return across, along
+
+
+def parting_heading(drum: DumbbellDrum) -> float:
+    """Return the heading ``arctan(p/s)`` in degrees where both dumbbells are equally high.
+
+    Beyond it the weight of the dumbbells no longer presses them against each other.
+    """
+    return math.degrees(math.atan2(*offsets(drum)))
+
+
+def pressing(drum: DumbbellDrum, heading: float) -> float:
+    """Return the force by which dumbbells press on each other, over the weight of a ball.
+
+    It acts across their axes: ``(p cos(theta) - s sin(theta)) / rho`` near the lowest line, where
+    both meet the same resistance to rolling.  ``heading`` in degrees, of right-handed pairs.
+    """
+    (across, along), theta = offsets(drum), math.radians(heading)
+    return (across * math.cos(theta) - along * math.sin(theta)) / drum.centre_radius
+
+
+def return_ratio(drum: DumbbellDrum) -> float:
+    """Return how much faster a pair turns to its heading of least energy than a dumbbell to zero.
+
+    If slips of any dumbbell turn it by the same mobility times the torque on it: small deviations
+    decay ``sqrt((s^2 + l^2 - p^2)^2 + 4 s^2 p^2) / l^2`` times as fast, by the energy
+    ``m g / (2 rho)`` times the sum of the squared distances of the balls from the lowest line.
+    """
+    across, along = offsets(drum)
+    stretched = along**2 + drum.length**2 - across**2
+    return math.hypot(stretched, 2 * along * across) / drum.length**2
+
+
+@dataclass(frozen=True)
+class ImpactTurn:
+    """What one impact does to a pair in a plane.
+
+    Attributes
+    ----------
+    turn : float
+        Mean turn of the two dumbbells, in rad, positive for right-handed pairs.
+    dissipated : float
+        Energy that the impact itself dissipated, in nJ.
+    """
+
+    turn: float
+    dissipated: float
+
+
+def turn_by_impact(drum: DumbbellDrum, speed: float) -> ImpactTurn:
+    """Return how far a right-handed pair turns if one dumbbell rolls against the other, at rest.
+
+    ``speed`` in mm/s.  On a plane, from the impact until both have stopped.  The turn grows as the
+    square of the speed over ``mu g``, ``mu`` being the dynamic coefficient of sliding.
+    """
+    plane = replace(
+        drum, drum_radius=FLAT, count=2, tilt=0.0, spin=0.0, restitution=0.0, floor=False
+    )
+    places = plane.pair.nested("R", heading=0.0, clearance=CONTACT).reshape(2, 3)
+    towards = math.copysign(1.0, places[1, 0] - places[0, 0])
+    v = np.zeros((2, 4))
+    v[0, 0], v[0, 3] = towards * speed / plane.centre_radius, -towards * speed / plane.ball_radius
+    slide, roll = (abs(speed) / (mu[1] * GRAVITY) for mu in (plane.sliding, plane.rolling))
+    duration = 2 * (slide + roll)
+    start = plane.state(places, v)
+    path = simulate(plane, start, duration, slide / STEPS, solver=SOLVER)
+    turn = float((path.q[-1, :, 2] - path.q[0, :, 2]).mean())
+    return ImpactTurn(turn, float(path.dissipated["impact"][-1]))
+
+
+# ---------------------------------------------------------------------------- means of driven pairs
+
+WINDOW = 5  # correlation times over which correlations are summed
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Behaviour of pairs of one length: means over time, then over the pairs that stayed together.
+
+    Headings and azimuth in degrees, ``climb_rate`` in mm/s, ``shift`` in mm; signs are those for
+    right-handed pairs (of left-handed ones, mirrored).
+
+    Attributes
+    ----------
+    drum : DumbbellDrum
+    chatter : float
+        Amplitude of the noise.
+    heading, shift, azimuth, climb_rate : Mean
+    early, late : Mean
+        The heading in both halves of the time.
+    drift : Mean
+        Late less early heading of each pair: where it is not zero, the heading has not settled.
+    scatter : float
+        Standard deviation of the heading in time.
+    samples : float
+        Effective number of independent headings, all pairs together: time over twice the
+        integrated autocorrelation time (:func:`correlation_time`).
+    held, count : int
+        Pairs that held to the end, and all.
+    minimiser : float
+        Heading of the energy's minimiser.
+    strata : mapping from str to float
+        See :meth:`DyadPaths.strata`.
+    """
+
+    drum: DumbbellDrum
+    chatter: float
+    heading: Mean
+    shift: Mean
+    azimuth: Mean
+    climb_rate: Mean
+    early: Mean
+    late: Mean
+    drift: Mean
+    scatter: float
+    samples: float
+    held: int
+    count: int
+    minimiser: float
+    strata: dict[str, float]
+
+    @property
+    def settled(self) -> bool:
+        """Whether both halves give the same heading to within two standard errors."""
+        return abs(self.drift.value) <= 2 * self.drift.error
+
+
+def steady(paths: DyadPaths, *, after: float) -> Steady:
+    """Return time averages from ``after`` on, and their means over the pairs."""
+    late = paths.times >= after
+    if not late.any():
+        msg = f"after: expected a time before the end, {paths.times[-1]:g} s; got {after:g}"
+        raise ValueError(msg)
+    sign = paths.signs
+    held = np.isinf(paths.lifetimes)
+    heading = np.degrees(sign * paths.heading[late])[:, held]
+    half = max(1, len(heading) // 2)
+
+    def averaged(values: Array) -> Mean:
+        return Mean.of(values.mean(axis=0))
+
+    return Steady(
+        drum=paths.drum,
+        chatter=paths.noise.chatter,
+        heading=averaged(heading),
+        shift=averaged(paths.shift[late][:, held]),
+        azimuth=averaged(np.degrees(paths.azimuth[late][:, held])),
+        climb_rate=Mean.of((sign * paths.climb_rates(after=after))[held]),
+        early=averaged(heading[:half]),
+        late=averaged(heading[half:]),
+        drift=Mean.of(heading[half:].mean(axis=0) - heading[:half].mean(axis=0)),
+        scatter=float(heading.std(axis=0).mean()) if held.any() else math.nan,
+        samples=sum(len(one) / (2 * correlation_time(one)) for one in heading.T),
+        held=int(held.sum()),
+        count=len(held),
+        minimiser=minimiser_heading(paths.drum),
+        strata=paths.strata(after=after),
+    )
+
+
+def correlation_time(values: ArrayLike) -> float:
+    """Return the integrated autocorrelation time of a series, in units of its interval.
+
+    ``1/2 + sum_k c_k / c_0``, summed up to the first ``k`` that is five times the sum ([Sokal]); a
+    mean over ``n`` values has the variance ``2 tau c_0 / n``.  A trend makes it long; it is at
+    least 1/2, that of independent values.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    x = x - x.mean()
+    padded = np.fft.rfft(x, 2 * len(x))
+    correlations = np.fft.irfft(np.abs(padded) ** 2)[: len(x)]
+    if not correlations[0] > 0.0:
+        return 0.5 * len(x)
+    sums = np.cumsum(correlations / correlations[0]) - 0.5
+    enough = np.arange(len(x)) >= WINDOW * sums
+    return max(0.5, float(sums[np.argmax(enough)])) if enough.any() else 0.5 * len(x)

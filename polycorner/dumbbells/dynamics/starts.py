@@ -8,7 +8,7 @@ import numpy as np
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.pair import Chirality, DumbbellPair
 from polycorner.minimisation import minimise
-from polycorner.toolkit import Array, Quotient, project
+from polycorner.toolkit import Array, Quotient, project, refuse
 
 WIDTH = 0.45  # rad, half the width of the strip in which a bunch is scattered
 ROOM = 3.0  # area of that strip in areas of the dumbbells
@@ -32,8 +32,7 @@ def isolated(
     """
     angles = np.array(headings, dtype=np.float64)
     if angles.shape != (drum.count,) or not np.isfinite(angles).all():
-        msg = f"headings: expected {drum.count} angles in rad; got {list(headings)}"
-        raise ValueError(msg)
+        refuse("headings", f"{drum.count} angles in rad", list(headings))
     step = 2 * (drum.length + 2 * drum.ball_radius)
     q = np.full((drum.count, 3), azimuth)
     q[:, 1] = eta + step * np.argsort(np.argsort(angles, kind="stable"), kind="stable")
@@ -74,8 +73,7 @@ def nested_pair(
         now = float(q[[2, 5]].mean())
         q = _cornered(pair, _turned(pair, q, (now if heading is None else heading) - now))
     if pair.chirality(q) != chirality:
-        msg = f"heading: expected one at which such dumbbells nest; got {heading}"
-        raise ValueError(msg)
+        refuse("heading", "one at which such dumbbells nest", heading)
     places = q.reshape(2, 3) - np.array([q[[0, 3]].mean(), q[[1, 4]].mean() - eta, 0.0])
     return np.asarray(places)
 

@@ -1,21 +1,17 @@
-from .atlas_graph import draw_atlas
 from .bifurcation import draw_bifurcation, draw_critical
 from .drum import DrumView, draw_drum, draw_history
 from .dyads import draw_heading, draw_pair
-from .experiments import draw_climbing, draw_exits, draw_steady_headings
+from .experiments import draw_climbing, draw_exits, draw_keel, draw_steady_headings
 from .film import Film, pair_film, run_film
-from .keel import draw_keel
-from .meetings import draw_meetings
-from .minima_map import draw_kinds, draw_minima_map
-from .motion_strips import draw_motions
+from .minima_map import draw_kinds, draw_minima_map, draw_pair_map
+from .motion_strips import draw_motions, draw_relative
 from .movies import write_movie
-from .pair_map import draw_pair_map
 from .placements import forbidden_solid, relative_coordinates, relative_placements
-from .relative import draw_relative
+from .relabelling import draw_atlas
 from .scenes import atlas_scene, drum_scene, glb, pair_scene, write_scene
 from .solid import SolidFacts, relative_corners, relative_curves, solid_facts, write_solid
 from .studies import draw_study
-from .wells import draw_wells
+from .wells import draw_meetings, draw_wells
 
 __all__ = [
     "DrumView",

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from polycorner.dumbbells.dynamics.bunch_in_space import BunchInSpaceRun
+from polycorner.dumbbells.dynamics.bunch import BunchInSpaceRun
 from polycorner.dumbbells.pictures.film import (
     FRAMES,
     LEFT,

@@ -1,8 +1,13 @@
-"""Edges of a pair's skeleton as strips of frames, from one corner to the next."""
+"""Edges of a pair's skeleton as strips of frames, and small pictures of two dumbbells."""
+
+from collections.abc import Callable
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
+from polycorner.dumbbells.pictures.bodies import contact_point
 from polycorner.dumbbells.pictures.relabelling import (
     EdgeClass,
     draw_flat_pair,
@@ -10,7 +15,8 @@ from polycorner.dumbbells.pictures.relabelling import (
     headline,
     relabelling_classes,
 )
-from polycorner.dumbbells.pictures.symbols import HANDS, corner_symbol
+from polycorner.dumbbells.pictures.symbols import CONTACT, HANDS, corner_symbol
+from polycorner.dumbbells.statics.relative import MARGIN, RelativePlacements
 from polycorner.dumbbells.statics.skeleton import PairAtlas
 from polycorner.toolkit import Array, checked, projected
 
@@ -61,3 +67,41 @@ def _frames(atlas: PairAtlas, motion: EdgeClass) -> list[Array]:
     settled = [projected(quotient, q, quotient.at(q).basis(held), 1.0) for q in chords[1:-1]]
     inner = [q if s is None else s.q for q, s in zip(chords[1:-1], settled, strict=True)]
     return [way[0], *inner, way[-1]]
+
+
+# --------------------------------------------------------- small pictures for figures of landscapes
+
+
+@checked
+def draw_relative(model: RelativePlacements) -> Callable[[Axes, Array], None]:
+    """Return what draws a relative placement into axes, with the axis of the drum upright.
+
+    As :func:`~polycorner.pictures.draw_landscape` and :func:`~polycorner.pictures.film_route` take
+    it: all pictures have one scale.
+
+    Parameters
+    ----------
+    model : RelativePlacements
+    """
+    pair = model.pair
+    reach = MARGIN * (pair.length + 2 * pair.ball_radius)
+
+    def draw(axes: Axes, point: Array) -> None:
+        gaps = dict(zip(model.polyhedron.names, model.polyhedron.values(point), strict=True))
+        closed = [
+            name
+            for name in pair.polyhedron.names
+            if name in gaps and abs(gaps[name]) < TOUCH * pair.ball_radius
+        ]
+        centres = pair.developed(model.placement(point))
+        centres -= centres.mean(axis=0)
+        draw_flat_pair(axes, pair, centres, ())
+        for name in closed:
+            x, y = contact_point(pair, centres, name)
+            axes.add_patch(
+                Circle((x, y), pair.ball_radius / 3, fc=CONTACT, ec="black", lw=0.4, zorder=6)
+            )
+        across = abs(centres[:, 0]).max() + MARGIN * pair.ball_radius
+        axes.set(xlim=(-across, across), ylim=(-reach, reach), aspect="equal")
+
+    return draw

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from polycorner.toolkit import SHADES, Array, bridged, checked
+from polycorner.toolkit import SHADES, Array, bridged, checked, refuse
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,8 +48,7 @@ def _axes(found: "xr.Dataset") -> tuple[str, str | None]:
     several = [name for name in found["status"].dims if found.sizes[name] > 1]
     numbers = [name for name in several if found[name].dtype.kind in "iuf"]
     if not numbers or len(several) > 2:
-        msg = f"found: expected one or two axes of several values; got {len(several)}"
-        raise ValueError(msg)
+        refuse("found", "one or two axes of several values", len(several))
     across = max(numbers, key=lambda name: found.sizes[name])
     return str(across), next((str(name) for name in several if name != across), None)
 
@@ -194,7 +193,7 @@ def draw_driven_sweep(found: "xr.Dataset", across: str, others: str | None) -> F
 def _bounds(axes: Axes, lengths: Array) -> None:
     """Draw headings of either hand between which noise leaves pairs, and the paper's."""
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.balance import parting_heading
+    from polycorner.dumbbells.dynamics.dyads import parting_heading
 
     drums = [DumbbellDrum(float(x)) for x in np.linspace(lengths.min(), lengths.max(), 100)]
     x = np.array([drum.length for drum in drums])

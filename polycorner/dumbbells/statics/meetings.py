@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.dumbbells.statics.pair_minima import energy_symmetry, kind_of
+from polycorner.dumbbells.statics.minima import energy_symmetry, kind_of
 from polycorner.landscapes import Basins, basins
 from polycorner.minimisation import Certificate
 from polycorner.toolkit import DEFAULT, Array, Progress, checked, checks, silent

@@ -20,7 +20,7 @@ import numpy as np
 
 from polycorner.branches import Diagram, EventCurve, branches, event_curves
 from polycorner.dumbbells.pair import DumbbellPair
-from polycorner.dumbbells.statics.pair_minima import kind_of
+from polycorner.dumbbells.statics.minima import kind_of
 from polycorner.formulas import SmoothFunction
 from polycorner.minimisation import Certificate, certify, minimise
 from polycorner.polyhedra import AllOf, Polyhedron, Symmetry

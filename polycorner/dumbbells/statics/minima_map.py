@@ -17,13 +17,13 @@ from scipy import ndimage
 
 from polycorner.branches import BranchKind, Diagram, EventCurve
 from polycorner.dumbbells.pair import LONGEST, DumbbellPair
+from polycorner.dumbbells.statics.minima import kind_of, pair_minima
 from polycorner.dumbbells.statics.minima_curves import (
     Rectangle,
     change_curves,
     change_events,
     isolated,
 )
-from polycorner.dumbbells.statics.pair_minima import kind_of, pair_minima
 from polycorner.dumbbells.statics.regions import Plane, deepest, filled, joined, near
 from polycorner.minimisation import Certificate, certify, minimise
 from polycorner.toolkit import Array, Checked, Progress, cached_property, checked, checks, silent

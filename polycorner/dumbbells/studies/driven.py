@@ -10,8 +10,7 @@ from polycorner.toolkit import LONGEST, Array, checked, choice, real, refuse
 
 if TYPE_CHECKING:
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.dyads import DyadPaths
-    from polycorner.dumbbells.dynamics.steady import Steady
+    from polycorner.dumbbells.dynamics.dyads import DyadPaths, Steady
     from polycorner.motion import Noise, Trajectory
 
 SINGLES = (12.0, 12.0, 6.0, -6.0)  # degrees: headings at the start
@@ -117,8 +116,7 @@ def driven(
         Naming the argument, what was expected and what came.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.dyads import SOLVER, DyadPaths, follow_pairs
-    from polycorner.dumbbells.dynamics.steady import steady
+    from polycorner.dumbbells.dynamics.dyads import SOLVER, DyadPaths, follow_pairs, steady
 
     real("tilt", tilt, unit="deg")
     real("duration", duration, above=0, most=LONGEST, unit="s")

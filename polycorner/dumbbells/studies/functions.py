@@ -116,8 +116,7 @@ def climbing(
         ``_error`` over the pairs that ``held``; ``law``, ``spin rho tan(heading)`` in mm/s.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics.dyads import Start, follow_dyads
-    from polycorner.dumbbells.dynamics.steady import steady
+    from polycorner.dumbbells.dynamics.dyads import Start, follow_dyads, steady
     from polycorner.motion import Noise
 
     whole("pairs", pairs, least=1)

@@ -56,14 +56,14 @@ def turning(
         zero; ``at``, the mean heading; ``single``, the relative rate of the headings of the single
         dumbbells in 1/s, and ``weight``, in degrees/s, the rate at which the weight would turn a
         pair if its slips had the same mobility
-        (:func:`~polycorner.dumbbells.dynamics.balance.return_ratio`); ``impacts``, the rate that
+        (:func:`~polycorner.dumbbells.dynamics.dyads.return_ratio`); ``impacts``, the rate that
         impacts of the power that was dissipated would give, each as a single one in a plane
-        (:func:`~polycorner.dumbbells.dynamics.balance.turn_by_impact`); ``power`` of the impacts in
+        (:func:`~polycorner.dumbbells.dynamics.dyads.turn_by_impact`); ``power`` of the impacts in
         nJ/s per pair; ``azimuth`` in degrees; ``pressing``, the mean force of the dumbbells on each
         other over the weight of a ball, by the closed form.
     """
     from polycorner.dumbbells.drum import DumbbellDrum
-    from polycorner.dumbbells.dynamics import balance
+    from polycorner.dumbbells.dynamics import dyads
     from polycorner.dumbbells.dynamics.dyads import (
         DyadPaths,
         Start,
@@ -94,9 +94,9 @@ def turning(
     rates, others = (np.polynomial.polynomial.polyfit(time, x, 1)[1] for x in (angle, single))
     lost = path.dissipated["impact"][late]
     power = float(lost[-1] - lost[0]) / (time[-1] - time[0]) / PAIRS
-    one = balance.turn_by_impact(plain, 2.0)
+    one = dyads.turn_by_impact(plain, 2.0)
     mean, slips = Mean.of(rates), Mean.of(others / single.mean(axis=0))
-    least = heading_at_shift(plain, balance.offsets(plain)[1])
+    least = heading_at_shift(plain, dyads.offsets(plain)[1])
     away = math.degrees(math.sin(2 * math.radians(float(angle.mean()) - least)) / 2)
     return {
         "rate": (mean.value, "deg/s"),
@@ -104,9 +104,9 @@ def turning(
         "at": (float(angle.mean()), "deg"),
         "single": (slips.value, "1/s"),
         "single_error": (slips.error, "1/s"),
-        "weight": (slips.value * balance.return_ratio(plain) * away, "deg/s"),
+        "weight": (slips.value * dyads.return_ratio(plain) * away, "deg/s"),
         "impacts": (math.degrees(one.turn) * power / one.dissipated, "deg/s"),
         "power": (power, "nJ/s"),
         "azimuth": (float(np.degrees(paths.azimuth[late]).mean()), "deg"),
-        "pressing": (balance.pressing(plain, float(angle.mean())), "1"),
+        "pressing": (dyads.pressing(plain, float(angle.mean())), "1"),
     }

@@ -1,7 +1,7 @@
 from .applications import live_application, page_application
+from .board import Descent, descent
 from .page import atlas_page, film_page, write_page
 from .server import PortTakenError, bound, serve
-from .steepest_descent import Descent, descent
 
 __all__ = [
     "Descent",

@@ -2,7 +2,7 @@
 
 Requests with a foreign ``Host`` (DNS rebinding) and connections from a foreign ``Origin`` are
 refused.  No request reads a file; the accepted messages are those of
-:mod:`polycorner.dumbbells.viewer.sliders`.
+:mod:`polycorner.dumbbells.viewer.board`.
 """
 
 import json
@@ -17,10 +17,9 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from polycorner.dumbbells.pair import DumbbellPair
 from polycorner.dumbbells.pictures.scenes import solid_bytes
-from polycorner.dumbbells.viewer.board import Board
+from polycorner.dumbbells.viewer.board import MESSAGE, Board, UnknownMessageError, hello, parsed
 from polycorner.dumbbells.viewer.page import own_file
 from polycorner.dumbbells.viewer.server import allowed, names_of
-from polycorner.dumbbells.viewer.sliders import MESSAGE, UnknownMessageError, hello, parsed
 from polycorner.toolkit import checked, page_file, three_script
 
 RATE = 300  # most messages of a page in a second

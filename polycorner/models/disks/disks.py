@@ -169,8 +169,7 @@ class TorusDisks(Checked, Described):
     def segment(self, q: ArrayLike, contact: str) -> Array:
         """Return the two centres, ``(2, 2)``, between which a contact lies."""
         if contact not in self.ends:
-            msg = f"contact: expected one of {', '.join(self.polyhedron.names)}; got {contact!r}"
-            raise ValueError(msg)
+            checks.refuse("contact", f"one of {', '.join(self.polyhedron.names)}", contact)
         i, j, image = self.ends[contact]
         centres = self.centres(self.manifold.point(q))
         return np.stack([centres[i - 1], centres[j - 1] + np.array(image) @ self.basis])

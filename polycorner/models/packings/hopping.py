@@ -70,8 +70,8 @@ class BasinHopping(Checked, Described):
 
     Attributes
     ----------
-    model : object
-        The model.
+    model : CirclesIn, SpheresInCube, PointsOnSphere or the like
+        See :func:`basin_hopping`.
     point : (n,) array
         The lowest point.
     hops, found_after : int
@@ -80,7 +80,7 @@ class BasinHopping(Checked, Described):
         How the search ended.
     """
 
-    model: Any
+    model: Hopped
     point: Array
     hops: int
     found_after: int
@@ -249,7 +249,7 @@ def _wider(rows: csr_array, entry: float) -> csr_array:
 class _Search:
     """The state of a search; it can be saved between two descents."""
 
-    def __init__(self, model: Any, rng: np.random.Generator, patience: int) -> None:
+    def __init__(self, model: Hopped, rng: np.random.Generator, patience: int) -> None:
         self.model, self.rng, self.patience = model, rng, patience
         self.descent = CornerDescent(model)
         self.hops = self.found_after = self.since = 0
@@ -259,10 +259,10 @@ class _Search:
     def hop(self) -> None:
         """Descend from a moved point, or from a new one after ``patience`` hops for nothing."""
         rng = deepcopy(self.rng)  # an interrupted descent leaves no trace
-        fresh = self.current is None or self.since >= self.patience
-        start = self.model.starts(rng, 1)[0] if fresh else self.model.moved(self.current, rng)
+        current = None if self.since >= self.patience else self.current
+        start = self.model.starts(rng, 1)[0] if current is None else self.model.moved(current, rng)
         found = self.descent(start)
-        lower = fresh or self._below(found, self.current)
+        lower = self._below(found, current)
         self.since = 0 if lower else self.since + 1
         self.current = found if lower else self.current
         self.hops, self.rng = self.hops + 1, rng
@@ -321,7 +321,7 @@ _SAVED = forms.entries(
 
 @checked
 def basin_hopping(
-    model: Any,
+    model: Hopped,
     rng: "np.random.Generator | int | None" = None,
     *,
     hops: int = 200,
@@ -376,9 +376,6 @@ def basin_hopping(
     checks.real("seconds", seconds, above=0, infinite=True)
     checks.real("below", below, infinite=True)
     checks.whole("patience", patience, least=1)
-    wanted = ("polyhedron", "energy", "starts", "repaired", "moved")
-    if not all(hasattr(model, name) for name in wanted):
-        checks.refuse("model", f"one with {', '.join(wanted)}", model, TypeError)
     search = _Search(model, deepcopy(checks.generator("rng", rng)), patience)
     path = None if keep is None else Path(keep)
     if path is not None and path.exists():
@@ -386,7 +383,8 @@ def basin_hopping(
     clock = None if path is None else Clock(lambda: SEARCHES.save_json(path, search.entries()))
 
     def told() -> tuple[float, float, str]:
-        return search.hops, hops, f"lowest energy {model.energy.value(search.best):.12g}"
+        lowest = math.inf if search.best is None else float(model.energy.value(search.best))
+        return search.hops, hops, f"lowest energy {lowest:.12g}"
 
     tasks = search.tasks(hops, below)
     ending = work_through(tasks, told, progress, seconds=seconds, clock=clock)

@@ -13,8 +13,7 @@ from polycorner import checks
 from polycorner.formulas.rows import SparseRows
 from polycorner.kinds import checked
 from polycorner.minimisation.sparse.chain import ChainEnd, ChainEnergy, descend
-from polycorner.models.packings.contacts import neighbours, rows_of
-from polycorner.models.packings.jammed import JammedPacking
+from polycorner.models.packings.jammed import JammedPacking, neighbours, rows_of
 from polycorner.printing import Described
 from polycorner.spaces.manifold import Array
 from polycorner.values import Checked

@@ -54,7 +54,7 @@ class CoordinateTable(Checked, Described):
         """Return the columns from ``start`` to ``stop`` (exclusive), counted from 0."""
         width = len(self.rows[0])
         if not 0 <= start < stop <= width:
-            checks.refuse("stop", f"columns within the {width} of the table", (start, stop))
+            checks.refuse("start, stop", f"columns within the {width} of the table", (start, stop))
         rows = tuple([row[start:stop] for row in self.rows])
         return CoordinateTable(rows, self.names[start:stop])
 

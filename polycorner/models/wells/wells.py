@@ -127,8 +127,7 @@ class Well(Value):
     def of_depth(cls, kind: Entrapment, depth: float, rim: float = 1.0, **others: float) -> "Well":
         """Return the well of a kind whose energy at the rim is ``depth``."""
         if kind not in KINDS:
-            msg = f"kind: expected U, half-U or half-V; got {kind!r}"
-            raise ValueError(msg)
+            checks.refuse("kind", "U, half-U or half-V", kind)
         slope = depth / rim if kind is Entrapment.HALF_V else 0.0
         stiffness = 0.0 if kind is Entrapment.HALF_V else 2 * depth / rim**2
         return cls(slope, stiffness, rim, kind is not Entrapment.U, **others)

@@ -1,9 +1,12 @@
 """Wrong arguments of pictures and pages: one table of call, exception and argument named."""
 
+import copy
 import math
+import pickle
 
 import numpy as np
 import pytest
+from elsewhere import called
 
 from polycorner import Manifold
 from polycorner.dumbbells import DumbbellDrum, DumbbellPair
@@ -15,7 +18,8 @@ from polycorner.dumbbells.pictures import (
     write_movie,
     write_scene,
 )
-from polycorner.dumbbells.viewer import write_page
+from polycorner.dumbbells.viewer import descent, write_page
+from polycorner.dumbbells.viewer.board import Board
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
 NESTED = DRUM.nested("L")
@@ -54,3 +58,43 @@ def test_wrong_arguments_are_named(call, error, argument, tmp_path):
     with pytest.raises(error, match=rf"^{argument}: expected (.|\n)*; got"):
         call(tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+# ------------------------------------------------------------------------------------------- values
+
+PAIR = DumbbellPair(16, 3, 1.5)
+
+
+def summary(solid, film, path, board):
+    """Return numbers that the values compute, those computed on demand included."""
+    return (
+        solid.volume,
+        len(solid.corners),
+        len(film),
+        float(path.lengths[-1]),
+        path.certificate.verdict.value,
+        board.certificate.energy,
+    )
+
+
+@pytest.fixture(scope="module")
+def values():
+    path = descent(PAIR.polyhedron, PAIR.energy, PAIR.nested("R", heading=0.3, clearance=1.0))
+    solid = forbidden_solid(PAIR, 16, period=math.pi)
+    return solid, pair_film(PAIR, path.points), path, Board.of(PAIR)
+
+
+def test_values_are_sent_to_a_spawned_process_after_use(values):
+    used = summary(*values)
+    assert called(summary, *values) == pytest.approx(used)
+    assert summary(*copy.deepcopy(values)) == pytest.approx(used)
+
+
+def test_arrays_are_read_only_also_after_unpickling(values):
+    for solid, film, path, _ in (values, pickle.loads(pickle.dumps(values))):
+        arrays = [solid.caps, solid.inside, solid.labels, solid.active, solid.bounds]
+        arrays += [film.times, film.centres, film.roles, path.points]
+        arrays += [*film.energies.values(), *film.contacts[-1].values()]
+        for array in arrays:
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0

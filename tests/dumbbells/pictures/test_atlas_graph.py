@@ -10,7 +10,7 @@ from matplotlib.colors import same_color
 from matplotlib.patches import FancyBboxPatch, PathPatch
 
 from polycorner.dumbbells import DumbbellPair
-from polycorner.dumbbells.pictures.atlas_graph import draw_atlas
+from polycorner.dumbbells.pictures.relabelling import draw_atlas
 from polycorner.dumbbells.pictures.symbols import HANDS
 
 

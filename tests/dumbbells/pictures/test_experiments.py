@@ -12,9 +12,9 @@ from matplotlib.colors import same_color
 
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.bunch import BunchRun
+from polycorner.dumbbells.dynamics.dyads import Steady
 from polycorner.dumbbells.dynamics.singles import Mean, Zigzag
 from polycorner.dumbbells.dynamics.starts import nested_pair
-from polycorner.dumbbells.dynamics.steady import Steady
 from polycorner.dumbbells.pictures.experiments import (
     COLOURS,
     LEVEL,

@@ -8,7 +8,7 @@ from polycorner import minimise, stratum_at
 from polycorner.dumbbells import DumbbellDrum, DumbbellPair
 from polycorner.dumbbells.dynamics.pairs import handedness
 from polycorner.dumbbells.pictures.film import HANDS, RIGHT, SINGLE, pair_film, run_film
-from polycorner.dumbbells.viewer.steepest_descent import descent
+from polycorner.dumbbells.viewer.board import descent
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
 BEGIN = DRUM.nested("R", heading=0.5, clearance=1.5) + np.array([0.08, 0, 0, 0.06, 0, -0.1])

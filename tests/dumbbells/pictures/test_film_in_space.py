@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from polycorner.dumbbells import DumbbellDrum
-from polycorner.dumbbells.dynamics.bunch import drum_for_bunch
-from polycorner.dumbbells.dynamics.bunch_in_space import BunchInSpaceRun, follow_in_space
+from polycorner.dumbbells.dynamics.bunch import BunchInSpaceRun, drum_for_bunch, follow_in_space
 from polycorner.dumbbells.pictures.film import LEFT, RIGHT, SINGLE
 from polycorner.dumbbells.pictures.film_in_space import film_in_space
 from polycorner.dumbbells.viewer.page import film_page

@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from polycorner.dumbbells.pictures.keel import (
+from polycorner.dumbbells.pictures.experiments import (
     CURVE,
     GROWING,
     HEADINGS,
@@ -19,8 +19,7 @@ from polycorner.dumbbells.pictures.keel import (
     draw_keel,
     place_region,
 )
-from polycorner.dumbbells.statics.keel import Keel
-from polycorner.dumbbells.statics.keel_formulas import net_torque, rolling_cosine
+from polycorner.dumbbells.statics.keel import Keel, net_torque, rolling_cosine
 from polycorner.pictures.style import save
 
 KEEL = Keel(math.radians(7), 0.1, 0.3, 0.05, 0.2)

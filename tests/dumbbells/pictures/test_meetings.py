@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 
 from polycorner.dumbbells import DumbbellPair, meeting_basins
 from polycorner.dumbbells.pictures import draw_meetings
-from polycorner.dumbbells.pictures.meetings import KNOWN, _deepest
+from polycorner.dumbbells.pictures.wells import KNOWN, _deepest
 from polycorner.pictures import save
 
 PAIR = DumbbellPair(16, 3, 1.5, 125)

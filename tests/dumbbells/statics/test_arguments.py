@@ -9,8 +9,8 @@ from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.statics.critical import critical_corner, plane_critical_formula
 from polycorner.dumbbells.statics.error_bars import heading_error_bar
 from polycorner.dumbbells.statics.keel import Keel, RestRegion, rests
+from polycorner.dumbbells.statics.minima import pair_minima
 from polycorner.dumbbells.statics.minima_map import minima_map
-from polycorner.dumbbells.statics.pair_minima import pair_minima
 from polycorner.dumbbells.statics.skeleton_map import pair_map
 from polycorner.dumbbells.statics.wells import dyad_holds
 

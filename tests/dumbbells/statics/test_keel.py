@@ -14,10 +14,11 @@ from polycorner.dumbbells.statics.keel import (
     Keel,
     RestRegion,
     exact_eastern_boundary,
+    force_ratio,
     rest_margin,
     rests,
+    s_curve,
 )
-from polycorner.dumbbells.statics.keel_formulas import force_ratio, s_curve
 from polycorner.formulas.kernels import address
 
 TILT = math.radians(7)

@@ -8,7 +8,7 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from polycorner.dumbbells.statics.keel_formulas import (
+from polycorner.dumbbells.statics.keel import (
     derivation,
     force_ratio,
     net_torque,

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from polycorner import minimise
 from polycorner.dumbbells import DumbbellPair, meeting_basins, meetings, placement_basins
-from polycorner.dumbbells.statics.pair_minima import kind_of
+from polycorner.dumbbells.statics.minima import kind_of
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
 REACH = 16 + 2 * 3

@@ -10,7 +10,7 @@ from crossings import crossing_clearance
 from polycorner import minimise
 from polycorner.branches import BranchKind
 from polycorner.dumbbells import DumbbellPair, long_rod_length, minima_map, pair_minima
-from polycorner.dumbbells.statics.pair_minima import kind_of
+from polycorner.dumbbells.statics.minima import kind_of
 
 NESTED = {"curvatures": [0.5, 1.95], "rods": (0.3, 0.95), "lengths": (2.3, 5.0), "starts": 60}
 CROSSED = {"curvatures": [1.0], "rods": (0.35, 0.6), "lengths": (5.0, 8.0), "starts": 60}

@@ -12,7 +12,7 @@ from strategies import placed_pairs
 
 from polycorner import Verdict
 from polycorner.dumbbells import DumbbellPair, dyad_minima
-from polycorner.dumbbells.statics.pair_minima import (
+from polycorner.dumbbells.statics.minima import (
     energy_symmetry,
     kind_of,
     pair_minima,

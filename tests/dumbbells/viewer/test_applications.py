@@ -12,12 +12,12 @@ from tornado.websocket import WebSocketClosedError, websocket_connect
 
 from polycorner.dumbbells import DumbbellPair
 from polycorner.dumbbells.viewer import applications
-from polycorner.dumbbells.viewer.server import bound
-from polycorner.dumbbells.viewer.sliders import (
+from polycorner.dumbbells.viewer.board import (
     MESSAGE,
     hello,
     sliders_for,
 )
+from polycorner.dumbbells.viewer.server import bound
 
 DRUM, PLANE = DumbbellPair(16, 3, 1.5, 125), DumbbellPair(16, 3, 1.5)
 SLIDERS = sliders_for(DRUM, 125.0)

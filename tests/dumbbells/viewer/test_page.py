@@ -20,8 +20,8 @@ from polycorner.dumbbells.pictures.film import (
     pair_film,
     stratum_words,
 )
+from polycorner.dumbbells.viewer.board import descent
 from polycorner.dumbbells.viewer.page import atlas_page, film_page, write_page
-from polycorner.dumbbells.viewer.steepest_descent import descent
 from polycorner.errors import PolycornerError
 from polycorner.pictures.pages import three_script
 

@@ -12,7 +12,7 @@ import pytest
 
 import polycorner
 from polycorner import minimise
-from polycorner.models.tutorial import Tutorial
+from polycorner.models.planar import Tutorial
 
 START = """
 from polycorner import Manifold, Polyhedron, minimise

@@ -124,5 +124,5 @@ def test_a_changed_file_is_refused(entry, value, tmp_path):
 def test_wrong_arguments(options, argument):
     with pytest.raises(ValueError, match=f"^{argument}: expected "):
         basin_hopping(MODEL, 0, **options)
-    with pytest.raises(TypeError, match=r"^model: expected one with polyhedron"):
+    with pytest.raises(TypeError, match=r"^model: expected something with polyhedron"):
         basin_hopping("square")

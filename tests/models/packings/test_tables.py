@@ -66,7 +66,7 @@ def test_columns_are_taken_out_with_their_names():
     centres = table.part(0, 2)
     assert (centres.names, centres.rows[0]) == (("x", "y"), (Fraction(1, 4), Fraction(1, 2)))
     assert CirclesIn("square", 2).point(centres)[-1] == pytest.approx(0.25)
-    with pytest.raises(ValueError, match=r"^stop: expected "):
+    with pytest.raises(ValueError, match=r"^start, stop: expected "):
         table.part(1, 4)
 
 

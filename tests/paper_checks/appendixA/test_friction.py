@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from paper_checks import Verdict
 from paper_checks.appendixA import coefficients, forces, rest, torque, turning
-from polycorner.dumbbells.statics.keel_formulas import force_ratio, net_torque
+from polycorner.dumbbells.statics.keel import force_ratio, net_torque
 
 azimuths = st.floats(-0.7, 0.7)
 headings = st.floats(-1.5, 1.5)

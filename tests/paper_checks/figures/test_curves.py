@@ -228,7 +228,7 @@ def held(phi, theta, rolling, sliding):
 )
 def test_the_eastern_boundary_is_where_carrying_lets_go(panel, rolling, sliding, drawn):
     axes = drawn("rest_regions").axes[panel]
-    from polycorner.dumbbells.pictures.keel import NEGATIVE, POSITIVE
+    from polycorner.dumbbells.pictures.experiments import NEGATIVE, POSITIVE
 
     for colour, sign in ((POSITIVE, 1), (NEGATIVE, -1)):
         (curve,) = lines(axes, colour)

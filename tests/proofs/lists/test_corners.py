@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from proof_files import changed, parts_of, verdict
 
 from polycorner import AnyOf, Manifold, Polyhedron
-from polycorner.models.tutorial import Tutorial
+from polycorner.models.planar import Tutorial
 from polycorner.polyhedra.symmetry import Element, Symmetry
 from polycorner.proofs import corners
 from polycorner.skeletons import Completeness
