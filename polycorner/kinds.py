@@ -6,9 +6,9 @@ iterables) is checked by the function itself.  A name that is known to a type ch
 ``sympy.Expr``, stands for every class of that name.
 """
 
-import ast
 import builtins
 import os
+import re
 import sys
 import types
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -29,6 +29,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 Test = Callable[[Any], bool]
 LOOKED_AT = 64  # members of a collection that are checked, so that long ones stay cheap
 OPEN = "anything"
+IMPORTED = re.compile(r"^[ \t]*from ([\w.]+) import (\([^)]*\)|.*)", re.MULTILINE)
 UNIONS = ("Energy", "Quantity")  # unions for a type checker; what takes them checks them
 WORDS: Mapping[Any, tuple[str, Test]] = {
     bool: ("True or False", lambda value: isinstance(value, bool | np.bool_)),
@@ -299,7 +300,13 @@ class _Names(dict[str, Any]):
 
 @cache
 def _imports(file: str) -> dict[str, str]:
-    """Return the names that a module imports from others, and those, also for a type checker."""
-    statements = ast.walk(ast.parse(Path(file).read_text(encoding="utf-8")))
-    imports = [node for node in statements if isinstance(node, ast.ImportFrom)]
-    return {name.asname or name.name: str(node.module) for node in imports for name in node.names}
+    """Return the names that a module imports from others, and those, also for a type checker.
+
+    They are read off its lines: to parse a whole module takes twenty times as long.
+    """
+    found = {}
+    for source, names in IMPORTED.findall(Path(file).read_text(encoding="utf-8")):
+        for one in re.sub(r"#.*|[()\s]+", " ", names).split(","):
+            name, _, alias = one.strip().partition(" as ")
+            found[alias.strip() or name] = source
+    return found

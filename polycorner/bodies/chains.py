@@ -24,6 +24,7 @@ from polycorner.formulas.families import stationary as stationary_of
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Program
 from polycorner.formulas.translate import compile_expressions
+from polycorner.motion.formulation import dotted
 from polycorner.spaces.embedding import rotation_matrix
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
@@ -179,23 +180,44 @@ class Chain:
         entries = [*origin, *(e for row in matrix for e in row)]
         return definitions, dict(zip(POSE, entries, strict=True))
 
+    def moving(self) -> "Formulas":
+        """Return the formulas, with rates of all numbers by the chain rule; ``x_dot`` of ``x``."""
+        import sympy
+
+        definitions, pose = self.formulas()
+        reads = zip(symbols(self.reads), symbols([*map(dotted, self.reads)]), strict=True)
+        rates, written = dict(reads), dict[str, sympy.Expr]()
+
+        def rate(e: "sympy.Expr") -> "sympy.Expr":
+            known = sorted(e.free_symbols & {*rates}, key=str)
+            return sum((sympy.diff(e, x) * rates[x] for x in known), sympy.S.Zero)
+
+        for name, e in definitions.items():
+            written[name] = e
+            if (change := rate(e)) != 0:
+                written[dotted(name)] = change
+                old, new = symbols([name, dotted(name)])
+                rates[old] = new
+        return written, pose | {dotted(name): rate(sympy.sympify(e)) for name, e in pose.items()}
+
     def function(
         self, manifold: Manifold, family: Family, parameters: list[float], label: str, member: str
     ) -> SmoothFunction:
-        """Return a gap of a linked part as a function of the joints."""
+        """Return a gap or slip of a linked part as a function of the joints, and their rates."""
+        found = linked(family, self)
         return SmoothFunction.member(
-            linked(family, self),
+            found,
             member,
             manifold,
             parameters=parameters,
-            reads=self.reads,
+            reads=found.variables,
             label=label,
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Linked(Family):
-    """A family of gaps of a linked part, composed with the placement of the link."""
+    """A family of gaps or slips of a linked part, composed with the placement of the link."""
 
     gap: Family | None = None
     chain: Chain | None = None
@@ -204,7 +226,7 @@ class Linked(Family):
         """Return the straight-line program of the values: that of the gaps, after the placement."""
         assert self.gap is not None
         assert self.chain is not None
-        definitions, pose = self.chain.formulas()
+        definitions, pose = _placement(self.gap, self.chain)
         placed = compile_expressions([*pose.values()], self.variables, (), definitions)
         graph, entry = placed.graph.copy(), dict(zip(pose, placed.outputs, strict=True))
         inputs = {("var", i): entry[_entry(name)] for i, name in enumerate(self.gap.variables)}
@@ -216,7 +238,9 @@ class Linked(Family):
             tuple(found[a] for a in program.outputs),
             len(self.variables),
             len(self.parameters),
-            tuple(graph.core(found[a]) for a in program.stationary),
+            tuple(graph.core(found[a]) for a in program.stationary)
+            if self.variables == self.chain.reads
+            else tuple(graph.node("var", i) for i in range(len(self.chain.reads))),
         )
 
 
@@ -225,24 +249,33 @@ def _entry(variable: str) -> str:
     return variable.replace(FIRST, "").replace(SECOND, "")
 
 
+def _moves(family: Family) -> bool:
+    """Whether functions of a family have velocities, as slips do."""
+    return any(name.endswith(dotted("")) for name in family.variables)
+
+
+def _placement(family: Family, chain: Chain) -> "Formulas":
+    return chain.moving() if _moves(family) else chain.formulas()
+
+
 @lru_cache(maxsize=256)
 def linked(family: Family, chain: Chain) -> Family:
     """Return the gaps of a family as functions of the joints of a chain."""
     sources = cache.source_key(frames.__name__, families.__name__, __name__)
     return Linked(
         family.names,
-        chain.reads,
+        (*chain.reads, *map(dotted, chain.reads)) if _moves(family) else chain.reads,
         family.parameters,
         partial(_formulas, family, chain),
         repr((sources, family.key, chain)),
-        stationary=stationary_of([family] * len(family.names)),
+        stationary=chain.reads if _moves(family) else stationary_of([family] * len(family.names)),
         gap=family,
         chain=chain,
     )
 
 
 def _formulas(family: Family, chain: Chain) -> "Formulas":
-    definitions, pose = chain.formulas()
+    definitions, pose = _placement(family, chain)
     places = {
         symbol: pose[_entry(name)]
         for name, symbol in zip(family.variables, symbols(family.variables), strict=True)

@@ -6,15 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from polycorner.bodies.chains import LinkStep, Moving, clean, crossed, dot, times, transposed
+from polycorner.bodies.chains import LinkStep, Moving, clean, crossed, dot, times
 from polycorner.bodies.links import RobotJoint
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.rigid_motions import number, spin
-from polycorner.bodies.walls import HalfSpace
 from polycorner.formulas.expressions import as_expression
 from polycorner.motion.contacts import Friction
 from polycorner.motion.friction import Interval
-from polycorner.spaces.manifold import Array
 
 if TYPE_CHECKING:
     import sympy
@@ -55,16 +53,6 @@ def joint_friction(joints: Mapping[str, RobotJoint], rates: Rates) -> Iterator[F
             other, rate, _ = joint.driven_by(name)
             load = sympy.S.One * number(joint.friction * abs(rate))
             yield Friction(f"{name} rubs", (rates[other] * sympy.S.One,), Interval(1.0), (load,))
-
-
-def slips(motion: Moving, point: Array, radius: float, wall: HalfSpace) -> "tuple[sympy.Expr, ...]":
-    """Return the slip at a wall of the point that is ``radius`` below a point of a link."""
-    normal = [number(x) for x in wall.normal.tolist()]
-    inward, r = times(transposed(motion.matrix), normal), number(radius)
-    arm = [number(x) - r * n for x, n in zip(point.tolist(), inward, strict=True)]
-    speed = [a + b for a, b in zip(motion.velocity, crossed(motion.spin, arm), strict=True)]
-    moving, tangents = times(motion.matrix, speed), np.linalg.svd(wall.normal[None])[2][1:]
-    return tuple(dot([*map(number, row)], moving) for row in clean(tangents).tolist())
 
 
 def joined(masses: Sequence[Mass]) -> Mass:

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from polycorner.bodies.arrangement import Arrangement
@@ -388,6 +387,8 @@ def nearest_points(one: Array, two: Array) -> tuple[Array, Array]:
     >>> p.round(9).tolist(), q.tolist()
     ([1.0, 0.0], [1.0, 3.0])
     """
+    from scipy.optimize import nnls
+
     if len(one) == len(two) == 1:
         return one[0], two[0]
     away = two[None] - one[:, None]

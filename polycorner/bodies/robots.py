@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from itertools import combinations
@@ -22,22 +22,23 @@ from polycorner.bodies.chains import (
     still,
 )
 from polycorner.bodies.checking import check_together
+from polycorner.bodies.dynamics import friction_of
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.kernels import together
+from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
 from polycorner.bodies.link_parts import CarriedPart, affine, carried_parts, gaps_of, touch
 from polycorner.bodies.link_trees import WORLD, LinkTree
 from polycorner.bodies.links import RobotJoint, RobotLink
 from polycorner.bodies.masses import Mass, stated_mass
-from polycorner.bodies.pairs import PlacedPart, Tree, apart
+from polycorner.bodies.pairs import PlacedPart, Tree, apart, distances
 from polycorner.bodies.poses import Placement, coordinates, frame_of
 from polycorner.bodies.rigid_motions import number
 from polycorner.bodies.shapes import Body, Part
-from polycorner.bodies.walls import HalfSpace, Wall, WallTouch, within
+from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
 from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
 from polycorner.motion.contacts import Friction, velocities
-from polycorner.motion.friction import Disc
 from polycorner.motion.limits import rate_limits
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     import sympy
 
 MOST_GAPS = 20_000
+Pairs = Iterable[tuple[CarriedPart, CarriedPart]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,8 @@ class Robot(Checked):
         Pairs of links, or of a link and something else, that do not touch each other.
     unit : str, optional
         Unit of length.
+    orientations : {"needed", "all"}, optional
+        Whether free balls, which look the same when turned, have coordinates of their rotation.
 
     Examples
     --------
@@ -108,12 +112,14 @@ class Robot(Checked):
     bodies: Mapping[str, Body] = field(default_factory=dict)
     ignored: Sequence[tuple[str, str]] = ()
     unit: str = ""
+    orientations: Literal["needed", "all"] = "needed"
 
     def __post_init__(self) -> None:
         for argument in ("links", "joints", "walls", "fixed", "bodies"):
             object.__setattr__(self, argument, dict(checks.mapping(argument, vars(self)[argument])))
         super().__post_init__()
         checks.choice("base", self.base, ("fixed", "floating"))
+        checks.choice("orientations", self.orientations, ("needed", "all"))
         if not self.links:
             refuse("links", "at least one link", self.links)
         named = {"links": RobotLink, "joints": RobotJoint, "fixed": Body, "bodies": Body}
@@ -145,19 +151,25 @@ class Robot(Checked):
         fixed: Mapping[str, Body] | None = None,
         bodies: Mapping[str, Body] | None = None,
         ignored: Sequence[tuple[str, str]] = (),
+        orientations: Literal["needed", "all"] | None = None,
     ) -> "Robot":
-        """Return the robot with more around it, and more pairs that do not touch."""
+        """Return the robot with more around it, and more pairs that do not touch.
+
+        Free bodies are in one polyhedron and one system with it.  ``orientations`` replaces those
+        of the robot, if it is given.
+        """
         return replace(
             self,
             walls={**self.walls, **checks.mapping("walls", {} if walls is None else walls)},
             fixed={**self.fixed, **checks.mapping("fixed", {} if fixed is None else fixed)},
             bodies={**self.bodies, **checks.mapping("bodies", {} if bodies is None else bodies)},
             ignored=(*self.ignored, *ignored),
+            orientations=self.orientations if orientations is None else orientations,
         )
 
     @cached_property
     def _tree(self) -> LinkTree:
-        loose = {name: _frame(body) for name, body in self.bodies.items()}
+        loose = {name: self._frame(body) for name, body in self.bodies.items()}
         return LinkTree(tuple(self.links), self.joints, self.base == "floating", loose)
 
     @property
@@ -181,6 +193,11 @@ class Robot(Checked):
             found += carried_parts(name, body, name, is_linked=False)
         return found
 
+    def _frame(self, body: Body) -> Frame:
+        """Return the coordinates of a free body; a ball about its origin need not turn."""
+        kind = frame_of(body, self.orientations)
+        return Frame.ROTATED if kind is Frame.AXIAL else kind
+
     def __repr__(self) -> str:
         """Return how many links there are, and the joints that are coordinates."""
         return f"Robot({len(self.links)} links, joints {', '.join(self._tree.free)})"
@@ -202,7 +219,7 @@ class Robot(Checked):
         start = 0
         whole = {self.root: None} if self.base == "floating" else {}
         for name, body in [*whole.items(), *self.bodies.items()]:
-            kind = Frame.ROTATED if body is None else _frame(body)
+            kind = Frame.ROTATED if body is None else self._frame(body)
             sized = Body({"": Part(np.zeros((1, 3)), 1.0)}) if body is None else body
             turn = self.scale / max(sized.size, self.scale)
             factor = kind.manifold(name, 3, self.scale, turn, self.unit)
@@ -308,13 +325,16 @@ class Robot(Checked):
                 f"{gaps_of(one.part, two.part)}; capsules have one each"
             )
             raise ValueError(msg)
-        placed = ((self._linked(a, b.carrier), self._linked(b, None)) for a, b in pairs)
-        found = [apart(self.manifold, *two, excluded=excluded) for two in placed]
+        found = [apart(self.manifold, *two, excluded=excluded) for two in self._both_placed(pairs)]
         found += [met.gap for _, met in self._at_walls]
         found = [*together(found), *self._limits]
         if not found:
             refuse("links", "something that links can touch, or limits of joints", [*self.links])
         return found
+
+    def _both_placed(self, pairs: Pairs) -> Iterator[tuple[PlacedPart, PlacedPart]]:
+        """Yield pairs of parts, the first as joints place it in the axes of the second."""
+        return ((self._linked(a, b.carrier), self._linked(b, None)) for a, b in pairs)
 
     def _linked(self, one: CarriedPart, start: str | None) -> PlacedPart:
         """Return a part as it is placed from a carrier, or in its own."""
@@ -390,8 +410,9 @@ class Robot(Checked):
         density: float = 1.0,
         masses: Mapping[str, Any] | None = None,
         torques: "Mapping[str, sympy.Expr] | None" = None,
-        friction: float | Mapping[str, float] = 0.0,
-        restitution: float | Mapping[str, float] = 0.0,
+        friction: Coefficients = 0.0,
+        rolling: Coefficients = 0.0,
+        restitution: Restitution = 0.0,
         impact: str = "poisson",
         rates: Mapping[str, float] | None = None,
         limits: "Mapping[str, sympy.Expr] | None" = None,
@@ -412,9 +433,13 @@ class Robot(Checked):
         torques : mapping from str to sympy.Expr, optional
             Torque or force of drives by joint, functions of coordinates, velocities and the time
             (:func:`~polycorner.motion.time_symbol`).  Beyond the effort of the joint it is cut off.
-        friction : float or mapping from str to float, optional
-            Coulomb's coefficient at walls, for all or by wall; half-spaces only.
-        restitution, impact : optional
+        friction, rolling, restitution : optional
+            Coefficients at all contacts, or by name, as in :meth:`Arrangement.system`: of a
+            contact, ``"finger.v1-floor"``, of two things that touch, ``("finger", "ball")`` or
+            ``"finger-ball"``, of a wall or fixed body, or of a link or body.  Friction of balls
+            needs ``orientations="all"``.  By the name of a joint ``restitution`` is that of its
+            limits; the friction of joints is their own.
+        impact : str, optional
             As in :class:`~polycorner.System`.
         rates : mapping from str to float, optional
             Largest rates of joints by name, in radians or lengths per second: limits called
@@ -458,7 +483,8 @@ class Robot(Checked):
         given = checks.mapping("torques", {} if torques is None else torques)
         checks.names("torques", given, self._tree.free)
         driven = link_laws.forces(self.joints, self._rates, given)
-        laws = (*link_laws.joint_friction(self.joints, self._rates), *self._wall_friction(friction))
+        rubbing, bounces = self._laws(friction, rolling, restitution)
+        laws = (*link_laws.joint_friction(self.joints, self._rates), *rubbing)
         bounds = checks.mapping("rates", {} if rates is None else rates)
         moving = {name: self._rates[name] for name in self._tree.free}
         further = checks.mapping("limits", {} if limits is None else limits)
@@ -468,26 +494,36 @@ class Robot(Checked):
             potential,
             driven,
             laws,
-            restitution=restitution,
+            restitution=bounces,
             impact=impact,
             limits={**rate_limits(moving, bounds), **further},
             nonholonomic={} if nonholonomic is None else nonholonomic,
         )
 
-    def _wall_friction(self, given: float | Mapping[str, float]) -> Iterator[Friction]:
-        """Yield the friction of links and bodies at half-spaces."""
-        if not isinstance(given, Mapping):
-            given = dict.fromkeys(self.walls, checks.real("friction", given, least=0))
-        checks.names("friction", given, self.walls)
-        for one, met in self._at_walls:
-            name, wall = met.name, met.wall
-            mu = checks.real("friction", given.get(name, 0.0), least=0)
-            if mu and not isinstance(wall, HalfSpace):
-                refuse("friction", f"0 for {name!r}, which is no half-space", mu)
-            if mu and isinstance(wall, HalfSpace):
-                moving, radius = self._motions[one.carrier], one.part.radius
-                slip = link_laws.slips(moving, met.point, radius, wall)
-                yield Friction(f"{met.gap.name} slips", slip, Disc(mu), met.gap.name)
+    def _laws(
+        self, friction: Coefficients, rolling: Coefficients, restitution: Restitution
+    ) -> tuple[tuple[Friction, ...], dict[str, float]]:
+        """Return the friction at contacts, and the coefficients of restitution by name."""
+        pairs = self._both_placed(self._pairs())
+        touches = [t for two in pairs for t in distances(self.manifold, *two)]
+        walls = [met for _, met in self._at_walls]
+        meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
+        meetings += [Meeting(met.gap.name, met.member.body, met.name) for met in walls]
+        meetings += [Meeting(f.name, j := f.name.rpartition(" ")[0], j) for f in self._limits]
+        known = laws_of(friction, rolling, restitution, meetings, {**self.links, **self.bodies})
+        for m in meetings:
+            for argument, by_name in (("friction", known.friction), ("rolling", known.rolling)):
+                self._check_turning(argument, m, by_name.get(m.contact, (0.0, 0.0)))
+        return friction_of(self.manifold, touches, walls, known.friction, known.rolling), {
+            m.contact: known.restitution.get(m.contact, 0.0) for m in meetings
+        }
+
+    def _check_turning(self, argument: str, met: Meeting, given: tuple[float, float]) -> None:
+        """Raise for friction at a ball without coordinates of its rotation."""
+        for name in (met.one, met.two):
+            if given[0] and self._tree.loose.get(name) is Frame.SHIFTED:
+                missing = f"coordinates of all rotations (orientations='all') of {name!r}"
+                refuse(argument, missing, given[0])
 
     @cached_property
     def _rates(self) -> "dict[str, sympy.Symbol]":
@@ -516,9 +552,3 @@ class Robot(Checked):
             if not any(several[c] for c in several if carrier in self._tree.path(c)):
                 refuse("links", f"a mass of {carrier!r}, or beyond it", "none")
         return {c: link_laws.joined(masses) if masses else None for c, masses in several.items()}
-
-
-def _frame(body: Body) -> Frame:
-    """Return the coordinates of a free body: a ball about its origin does not turn."""
-    kind = frame_of(body, "needed")
-    return Frame.ROTATED if kind is Frame.AXIAL else kind

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import nnls
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
@@ -119,6 +118,8 @@ def hull_distance(first: Array, second: Array) -> float:
     With the differences ``p`` of vertices, ``sum_i x_i p_i`` divided by ``sum_i x_i`` is the least
     where ``|sum_i x_i p_i|^2 + (sum_i x_i - 1)^2`` is, over all ``x >= 0`` ([LawsonHanson] ch. 23).
     """
+    from scipy.optimize import nnls
+
     differences = (first[:, None] - second).reshape(-1, first.shape[1])
     size = float(abs(differences).max()) or 1.0
     rows = np.vstack([differences.T / size, np.ones(len(differences))])

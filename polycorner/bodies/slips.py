@@ -326,6 +326,14 @@ def _motion(role: str, frame: Frame, d: int) -> RigidVelocity:
     """Return the motion of a body."""
     if frame is Frame.FIXED:
         return RigidVelocity(zero(), zero(), zero())
+    if frame is Frame.LINKED:  # [spin] is the rate of the matrix times its transpose
+        names = frame.variables(role, d)
+        place, changes = symbols(names), symbols([*map(dotted, names)])
+        (o, *rows), (v, *turns) = (
+            [(x[k], x[k + 1], x[k + 2]) for k in range(0, len(x), d)] for x in (place, changes)
+        )
+        omega = dot(turns[2], rows[1]), dot(turns[0], rows[2]), dot(turns[1], rows[0])
+        return RigidVelocity(v, omega, o)
     manifold, spin = frame.manifold(role, d, 1.0, 1.0, ""), zero()
     rates = velocities(manifold)
     if frame is Frame.TURNED:

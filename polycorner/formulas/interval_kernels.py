@@ -24,7 +24,7 @@ from polycorner.formulas import (
 from polycorner.formulas.batches import POINTER, VOID, gather, loop, row, store
 from polycorner.formulas.interval_emit import IntervalEmitter
 from polycorner.formulas.interval_library import Sides
-from polycorner.formulas.machine_code import code_name, kept_code, machine_code
+from polycorner.formulas.machine_code import code_name, emitted_code, kept_code
 from polycorner.formulas.programs import LEAVES, Graph
 from polycorner.formulas.ranges import Fact
 from polycorner.formulas.rounding import ROUNDINGS, Stepped, greatest, least
@@ -82,7 +82,7 @@ class IntervalKernel:
         def make() -> bytes:
             LOG.debug("compiling enclosures of %d results", sum(self.sizes))
             # Each node is emitted once and simplified before, so that LLVM's passes find nothing.
-            return machine_code(str(self._module(used, kept, name)), optimise=False)
+            return emitted_code(str(self._module(used, kept, name)))
 
         self._engine, (address,), self.origin = kept_code(name, [name], make)
         pointers = [ctypes.c_void_p] * (2 + len(self._widths()))

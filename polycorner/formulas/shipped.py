@@ -2,8 +2,11 @@
 
 Numba needs half a minute to infer types and to make LLVM's intermediate code of an algorithm.  This
 code does not depend on the processor, so that the package contains it.  Where its sources were
-changed since, or this version of LLVM does not understand it, it is made anew.  Machine code is
-cached.
+changed since, or this version of LLVM does not understand it, it is made anew.
+
+LLVM needs seconds for good machine code of it, more than many a program has to do.  So quick code
+is made first, and better code once the quick one has run for long enough; results are the same to
+the last bit.  Both are cached.
 """
 
 import ctypes
@@ -15,12 +18,15 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass
 from importlib.resources import files
+from math import inf
 from pathlib import Path
-from typing import Any
+from threading import Lock
+from time import perf_counter
+from typing import Any, NamedTuple
 
 from polycorner.atomic import write_atomically
 from polycorner.formulas.cache import one_at_a_time, read_code, sources_digest
-from polycorner.formulas.machine_code import kept_code, machine_code, machine_key
+from polycorner.formulas.machine_code import emitted_code, kept_code, machine_key
 from polycorner.values import cached_property
 
 LOG = logging.getLogger("polycorner.compilation")
@@ -48,6 +54,9 @@ class Shipped:
         That of these: whole numbers.
     what, seconds : str, int
         What is compiled, and how long it takes to make it anew, in s of processor time.
+    patience : float, optional
+        How long quick code runs in a process before better code is made, in s: about as long as
+        making it takes, so that no program takes twice the time that it might have taken.
     sources : tuple of str
         Python files from which the code is made; if empty, all but those of ``without``.
     """
@@ -60,6 +69,7 @@ class Shipped:
     results: int
     what: str
     seconds: int
+    patience: float = 2.0
     sources: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     number: type[ctypes.c_int64] | type[ctypes.c_double] = ctypes.c_int64
@@ -87,53 +97,110 @@ class Shipped:
         """Make the file anew."""
         write_atomically(self.path, lzma.compress((self.head + self.make()).encode(), preset=9))
 
-    @cached_property
-    def _code(self) -> tuple[Any, list[int]]:
-        """What holds the machine code; of several processes one compiles it, and others wait."""
-        head = self.head
-        key = repr((head, self.file, machine_key()))
-        name = f"{self.file.partition('.')[0]}_{hashlib.sha256(key.encode()).hexdigest()[:32]}"
-        turn = one_at_a_time(name) if read_code(name) is None else nullcontext()
-        with turn:
-            holder, addresses, _ = kept_code(name, list(self.names), lambda: self._made(head))
-        return holder, addresses
-
     @property
     def addresses(self) -> list[int]:
         """The addresses of the functions, for callers in machine code."""
-        return self._code[1]
+        return self._optimised.addresses
 
     @cached_property
     def functions(self) -> tuple[Function, ...]:
-        """The functions."""
-        holder, addresses = self._code
-        return tuple(self._function(address, holder) for address in addresses)
+        """The functions, which are called without the interpreter's lock."""
+        code = _InUse(self)
+        return tuple(self._function(code, number) for number in range(len(self.names)))
 
-    def _made(self, head: str) -> bytes:
-        """Return machine code, from the intermediate code at hand if it is that of the sources."""
-        text = self.text
-        if text.startswith(head):
-            try:
-                return machine_code(text, optimise=False)
-            except RuntimeError as error:
-                LOG.info("intermediate code of %s is not understood: %s", self.what, error)
-        LOG.warning("compiling %s, once on this machine: about %d s", self.what, self.seconds)
-        return machine_code(self.make(), optimise=False)
-
-    def _function(self, address: int, holder: Any) -> Function:
-        """Return a function that calls compiled code without the interpreter's lock."""
-        words = [ctypes.c_void_p] * (2 + self.arguments)  # a table is one, too
-        compiled = ctypes.CFUNCTYPE(ctypes.c_int32, *words)(address)
+    def _function(self, code: "_InUse", number: int) -> Function:
         room = self.number * max(self.results, 1)
         count = self.results
 
-        def call(*arguments: int | bytes, _: Any = holder) -> list[Any]:
-            results, failure = room(), ctypes.c_void_p()
-            if compiled(ctypes.byref(results), ctypes.byref(failure), *arguments):
-                raise _exception(failure)
+        def call(*arguments: int | bytes) -> list[Any]:
+            results = room()
+            code.run(number, ctypes.byref(results), arguments)
             return results[:count]
 
         return call
+
+    @cached_property
+    def _name(self) -> str:
+        """The name of the machine code in the cache."""
+        key = repr((self.head, self.file, machine_key()))
+        return f"{self.file.partition('.')[0]}_{hashlib.sha256(key.encode()).hexdigest()[:32]}"
+
+    @cached_property
+    def _optimised(self) -> "_Code":
+        return self._kept(self._name, self._made)
+
+    def _first(self) -> tuple["_Code", bool]:
+        """Return the code to begin with, and whether there is better code."""
+        if read_code(self._name) is None:
+            try:
+                return self._kept(f"{self._name}_quick", self._quickly_made), True
+            except RuntimeError as error:
+                LOG.info("intermediate code of %s cannot be used: %s", self.what, error)
+        return self._optimised, False
+
+    def _kept(self, name: str, make: Callable[[], bytes]) -> "_Code":
+        """Return code from the cache; of several processes one makes it, and others wait."""
+        turn = one_at_a_time(name) if read_code(name) is None else nullcontext()
+        with turn:
+            holder, addresses, _ = kept_code(name, list(self.names), make)
+        words = [ctypes.c_void_p] * (2 + self.arguments)  # a table is one, too
+        function = ctypes.CFUNCTYPE(ctypes.c_int32, *words)
+        return _Code(holder, addresses, [function(address) for address in addresses])
+
+    def _fresh_text(self) -> str:
+        """Return the intermediate code at hand, or raise RuntimeError if sources were changed."""
+        text = self.text
+        if not text.startswith(self.head):
+            msg = "it is not that of the sources"
+            raise RuntimeError(msg)
+        return text
+
+    def _quickly_made(self) -> bytes:
+        return emitted_code(self._fresh_text(), quick=True)
+
+    def _made(self) -> bytes:
+        """Return machine code, from the intermediate code at hand if it can be used."""
+        try:
+            return emitted_code(self._fresh_text())
+        except RuntimeError as error:
+            LOG.info("intermediate code of %s cannot be used: %s", self.what, error)
+        LOG.warning("compiling %s, once on this machine: about %d s", self.what, self.seconds)
+        return emitted_code(self.make())
+
+
+class _Code(NamedTuple):
+    """Machine code: what holds it, where its functions are, and these as Python calls them."""
+
+    holder: Any
+    addresses: list[int]
+    functions: list[Callable[..., int]]
+
+
+class _InUse:
+    """The machine code that is used, quick or optimised."""
+
+    def __init__(self, shipped: Shipped) -> None:
+        self._shipped = shipped
+        self._code, quick = shipped._first()  # noqa: SLF001 - its other half
+        self._left = shipped.patience if quick else inf  # s until better code is worth making
+        self._improving = Lock()
+
+    def run(self, number: int, results: Any, arguments: tuple[Any, ...]) -> None:
+        """Call a function, or raise what it raises; better code takes over between two calls."""
+        if self._left <= 0:
+            self._improve()
+        failure, begun = ctypes.c_void_p(), perf_counter()
+        failed = self._code.functions[number](results, ctypes.byref(failure), *arguments)
+        self._left -= perf_counter() - begun
+        if failed:
+            raise _exception(failure)
+
+    def _improve(self) -> None:
+        with self._improving:
+            if self._left <= 0:
+                # Other threads may still run the quick code: Shipped's functions keep it.
+                self._quick, self._code = self._code, self._shipped._optimised  # noqa: SLF001
+                self._left = inf
 
 
 class _Description(ctypes.Structure):

@@ -7,7 +7,6 @@ from enum import Enum
 from itertools import pairwise, product
 
 import numpy as np
-from scipy.optimize import linprog
 
 from polycorner.checks import instance, refuse
 from polycorner.motion.formulation import moment
@@ -319,6 +318,8 @@ def _least(
     cost: Array, equal: list[tuple[Array, float]], below: list[tuple[Array, float]]
 ) -> Array | None:
     """Return the minimum of a linear programme, infinite if there is none, None without a point."""
+    from scipy.optimize import linprog
+
     sides = [
         (np.array([row for row, _ in side]), np.array([value for _, value in side]))
         if side

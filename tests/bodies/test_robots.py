@@ -27,6 +27,7 @@ from polycorner.bodies import (
     polytope,
     sphere,
 )
+from polycorner.bodies.motions import nearest_points
 from polycorner.motion.formulation import moment
 
 CUBE = [[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
@@ -439,3 +440,64 @@ def test_what_no_robot_has_is_refused():
     many = RobotLink(compound({str(k): Body(polytope(CUBE).parts) for k in range(9)}))
     with pytest.raises(ValueError, match=r"at most 20000 gaps.*capsules have one each"):
         _ = Robot({"a": many, "b": link, "c": many}, chain).polyhedron
+
+
+@settings(max_examples=3)
+@given(st.integers(0, 10**6))
+def test_slips_of_links_are_those_of_their_points(seed):
+    """From difference quotients of where two links have the place at which they touch."""
+    robot, h = tree(seed, 3, kinds=("revolute", "prismatic")), 1e-6
+    q, v = somewhere(robot, seed)
+    laws, names = robot.system(friction=0.5).friction, [f.name for f in robot.polyhedron.functions]
+    poses = [slow_poses(robot, q + side * h * v)[0] for side in (0, 1, -1)]
+    found = {law.load: [s.value(np.concatenate([q, v])) for s in law.slip] for law in laws}
+    assert {*found} == {name for name in names if "-" in name}
+    for contact, slip in found.items():
+        one, two = (name.split(".")[0] for name in contact.split("-"))
+        if two == "floor":
+            continue
+        a, b = (robot.placed(q)[name].parts[""] for name in (one, two))
+        p, o = nearest_points(a.points, b.points)
+        normal = (p - o) / np.linalg.norm(p - o)
+        place, speeds = np.append(p - a.radius * normal, 1), []
+        for link in (one, two):
+            local = np.linalg.inv(poses[0][link]) @ place
+            speeds.append((poses[1][link] - poses[2][link]) @ local / (2 * h))
+        across = (speeds[0] - speeds[1])[:3]
+        across -= normal * (normal @ across)
+        assert np.linalg.norm(slip) == pytest.approx(np.linalg.norm(across), abs=1e-6)
+
+
+def gripper(**given):
+    """Two fingers that slide towards each other, and a ball between them."""
+    finger = RobotLink(capsule([0, 0, -0.2], [0, 0, 0.2], 0.05), Mass(0.2, [0, 0, 0], np.eye(3)))
+    joints = {
+        name: RobotJoint("palm", f"{name}_finger", "prismatic", axis=[sign, 0, 0])
+        for name, sign in (("left", 1), ("right", -1))
+    }
+    links = {"palm": RobotLink(), "left_finger": finger, "right_finger": finger}
+    return Robot(links, joints).among(bodies={"ball": sphere(0.1)}, **given)
+
+
+@pytest.mark.parametrize("mu", [0.45, 0.55])
+def test_a_gripper_holds_a_ball_where_friction_reaches_its_weight(mu):
+    """Two fingers press with 10 N each: friction carries up to ``2 mu 10`` N of 10 N."""
+    robot = gripper(orientations="all")
+    push = dict.fromkeys(("left", "right"), sympy.Integer(10))
+    names = {("ball", "left_finger"): mu, "right_finger-ball": mu}
+    # Only the ball has weight: the fingers cannot fall.
+    system = robot.system(gravity=[0, 0, -10], masses={"ball": 1.0}, torques=push, friction=names)
+    start = robot.point({"left": -0.15, "right": -0.15, "ball": [0, 0, 0]})
+    path = simulate(system, system.state(start), 0.1, 1e-3)
+    fallen = -path.q[-1, 0, robot.manifold.names.index("zball")]
+    expected = 0.0 if mu > 0.5 else (10 - 2 * mu * 10) * 0.1**2 / 2
+    assert fallen == pytest.approx(expected, abs=1e-4)
+
+
+def test_friction_of_links_is_refused_where_it_means_nothing():
+    with pytest.raises(ValueError, match="friction: expected coordinates of all rotations"):
+        gripper().system(friction=0.3)
+    with pytest.raises(ValueError, match="friction: expected names among"):
+        gripper(orientations="all").system(friction={"bal": 0.3})
+    with pytest.raises(ValueError, match="orientations: expected"):
+        gripper(orientations="none")

@@ -65,6 +65,7 @@ def made():
 """
 START = """
 import sys
+from polycorner.formulas.cache import cache_folder
 from polycorner.formulas.shipped import Shipped
 
 def make():
@@ -73,7 +74,7 @@ def make():
 
 leaves = Shipped(
     package="leaves", file="leaves.ll.xz", make=make, names=("divide", "twice"),
-    arguments=1, results=2, what="leaves", seconds=1,
+    arguments=1, results=2, what="leaves", seconds=1, patience={patience},
 )
 if "write" in sys.argv:
     leaves.write()
@@ -83,6 +84,7 @@ try:
 except ZeroDivisionError as error:
     assert str(error)
     print(*divide(5), *twice(6))
+print(*sorted("quick" in p.name for p in cache_folder().glob("kernels/*.o")))
 """
 
 
@@ -97,11 +99,14 @@ def leaves(tmp_path):
     return folder
 
 
-def start(folder, cache, *arguments):
-    """Return what the functions give, and how often intermediate code was made."""
+def start(folder, cache, *arguments, patience=0.0):
+    """Return what the functions give, how often intermediate code was made, and what is cached.
+
+    Of each file of machine code, whether it was made quickly.
+    """
     places = [folder.parent, Path(polycorner.__file__).parents[1]]
     done = subprocess.run(
-        [sys.executable, "-c", START, *arguments],
+        [sys.executable, "-c", START.format(patience=patience), *arguments],
         env={
             **os.environ,
             "POLYCORNER_CACHE_DIR": str(folder.parent / cache),
@@ -112,18 +117,27 @@ def start(folder, cache, *arguments):
         check=False,
     )
     assert not done.returncode, done.stderr
-    *made, results = done.stdout.splitlines()
-    return list(map(int, results.split())), len(made)
+    *made, results, kept = done.stdout.splitlines()
+    return list(map(int, results.split())), len(made), kept
 
 
 def test_code_is_made_anew_only_if_a_file_was_changed(leaves):
     at_first, changed = [24, 7, 40, 6], [36, 7, 60, 6]
-    assert start(leaves, "one") == (at_first, 1)
-    assert start(leaves, "one") == (at_first, 0)  # machine code from the cache
-    assert start(leaves, "two", "write") == (at_first, 1)
-    assert start(leaves, "three") == (at_first, 0)  # from the intermediate code
+    assert start(leaves, "one") == (at_first, 1, "False")
+    assert start(leaves, "one") == (at_first, 0, "False")  # machine code from the cache
+    assert start(leaves, "two", "write") == (at_first, 1, "False True")
+    assert start(leaves, "three") == (at_first, 0, "False True")  # from the intermediate code
     (leaves / "leaf.py").write_text(LEAF.format(factor=3))
-    assert start(leaves, "three") == (changed, 1)
+    assert start(leaves, "three") == (changed, 1, "False False True")
+
+
+def test_code_is_optimised_once_it_was_used_for_long_enough(leaves):
+    """In whichever process; quick code does the same, and raises the same."""
+    results = [24, 7, 40, 6]
+    assert start(leaves, "one", "write", patience=60.0) == (results, 1, "True")
+    assert start(leaves, "one", patience=60.0) == (results, 0, "True")
+    assert start(leaves, "one") == (results, 0, "False True")
+    assert start(leaves, "one", patience=60.0) == (results, 0, "False True")
 
 
 def test_a_table_holds_numbers_addresses_and_lengths():

@@ -1,5 +1,6 @@
 """The engine: room for contacts, and the key under which its code is cached."""
 
+import ctypes
 import os
 import subprocess
 import sys
@@ -8,9 +9,11 @@ import numpy as np
 import pytest
 
 from polycorner import Manifold, Polyhedron, System, velocities
+from polycorner.bodies import Arrangement, HalfSpace, Hinge, Motor, capsule, polygon
 from polycorner.dumbbells.drum import DumbbellDrum
 from polycorner.dumbbells.dynamics.starts import bunch
 from polycorner.errors import SolverError
+from polycorner.formulas import shipped
 from polycorner.motion.engine import driver, layout, sizes
 from polycorner.motion.engine.arrays import CONTACTS_FULL, DONE, EVENTS_FULL
 from polycorner.motion.engine.intermediate import ANY, SHIPPED, compiled_advance
@@ -95,6 +98,52 @@ def test_a_known_number_of_coordinates_changes_nothing(monkeypatch, count):
         np.testing.assert_array_equal(array, unknown[name], err_msg=name)
 
 
+def boxes_on_a_slope(count=3):
+    box = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    a = Arrangement({"A": box}, {"floor": HalfSpace([0, 1], [0, 0])}, orientations="all")
+    system = a.system(gravity=[3, -10], friction=0.3, restitution=0.4, count=count)
+    return system, system.state(np.array([[0.3 * k, 1.2 + 2.4 * k, 0.1 * k] for k in range(count)]))
+
+
+def a_driven_link():
+    joints = {"hinge": Hinge("world", "A", at=[0, 1.5], limits=(-3, 3))}
+    floor = {"floor": HalfSpace([0, 1], [0, 0])}
+    a = Arrangement({"A": capsule([0, 0], [1.45, 0], 0.1)}, floor, joints=joints)
+    given = {"drives": {"push": Motor("hinge", -3.0)}, "rates": {"hinge": 4.0}}
+    system = a.system(gravity=[0, -10], friction={"floor": 0.4, "hinge": 0.1}, **given)
+    return system, system.state(a.point(joints={"hinge": 0.2}))
+
+
+def dumbbells_that_are_kicked():
+    drum = DumbbellDrum(count=9, floor=True)
+    return drum, drum.state(bunch(drum, np.random.default_rng(3)))
+
+
+SCENES = (boxes_on_a_slope, a_driven_link, dumbbells_that_are_kicked)
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.__name__)
+def test_quick_code_gives_the_same_bits(monkeypatch, scene):
+    """Made with no optimisation at all, as where nothing is cached yet."""
+    system, state = scene()
+    kicked = scene is dumbbells_that_are_kicked
+    noise = Noise(chatter=0.2, kicks={"eta": 1.0, "theta": 0.1}, seed=2) if kicked else None
+    known = advanced(system, state, noise, 0.5)
+    monkeypatch.setattr(shipped, "read_code", lambda _: None)
+    quick, inferior = SHIPPED[4 if kicked else 3]._first()
+    assert inferior
+
+    def advance(tables, steps):
+        results, failure = (ctypes.c_int64 * 3)(), ctypes.c_void_p()
+        assert not quick.functions[0](results, ctypes.byref(failure), *tables.tolist(), steps)
+        return results[:]
+
+    monkeypatch.setattr(driver, "compiled_advance", lambda _: advance)
+    found = advanced(system, state, noise, 0.5)
+    for name, array in known.items():
+        np.testing.assert_array_equal(array, found[name], err_msg=name)
+
+
 RUN = """
 import sys
 from polycorner.models.textbook import bouncing_ball
@@ -107,11 +156,11 @@ print(simulate(ball, ball.state([1.0]), 2.0, 1e-2).q.tobytes().hex())
 """
 
 
-@pytest.mark.parametrize("shipped", ["", SHIPPED[ANY].head + "words of another version"])
-def test_without_it_numba_makes_the_same_engine(tmp_path, shipped):
+@pytest.mark.parametrize("text", ["", SHIPPED[ANY].head + "words of another version"])
+def test_without_it_numba_makes_the_same_engine(tmp_path, text):
     """The file may be missing, and another version of LLVM may not understand it."""
     results = []
-    for number, arguments in enumerate(([], [shipped])):
+    for number, arguments in enumerate(([], [text])):
         run = subprocess.run(
             [sys.executable, "-c", RUN, *arguments],
             env={**os.environ, "POLYCORNER_CACHE_DIR": str(tmp_path / str(number))},
