@@ -38,6 +38,7 @@ def evaluate(problem, u, F, J, H, size, second):
                     for j in range(k):
                         b = reads[r0 + j]
                         H[row, a, b] = work[h0 + (o * k + i) * k + j] * scales[a] * scales[b]
+    # Used once more, so that the array lives until the kernels have read it by its address.
     work[0] = 0.0
 
 

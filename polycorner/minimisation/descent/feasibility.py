@@ -22,6 +22,7 @@ def least_violation(A, b, equations):
     n = A.shape[1]
     G, g = np.zeros((n, n)), np.zeros(n)
     for k in range(n):
+        # Damped: rows that contradict each other may ask for steps without end.
         G[k, k] = 1e-3
     for i in range(A.shape[0]):
         if b[i] < 0.0 or i >= A.shape[0] - equations:
@@ -51,12 +52,14 @@ def project(problem, use, m, u, F, J, H, size, limit):
         reach = largest(d)
         if not reach > 0.0:
             return False
+        # Linearisations hold over half a scale at most.
         factor = min(1.0, 0.5 / reach)
         improved = False
         for _ in range(12):
             trial = plus(u, factor, d)
             evaluate(problem, trial, F, J, H, size, False)
             after = violation(F, J, use, m)
+            # Armijo's condition on the largest violation, which a full step would remove.
             if after < worst * (1.0 - 0.1 * factor) or after <= FEASIBLE:
                 for k in range(n):
                     u[k] = trial[k]

@@ -78,6 +78,7 @@ def svd(A):
     never_inline()
     m, n = A.shape
     W, V = A.copy(), identity(n)
+    # Columns below rounding are zero: between two of them an angle has no meaning.
     negligible = 1e-32 * m * n * largest_entry(A) ** 2
     for _ in range(60):
         turned = False
@@ -91,6 +92,7 @@ def svd(A):
                 if abs(c) <= 1e-15 * np.sqrt(a * b) or min(a, b) <= negligible:
                     continue
                 turned = True
+                # The smaller of the two angles that make the columns orthogonal.
                 zeta = (b - a) / (2.0 * c)
                 t = (1.0 if zeta >= 0 else -1.0) / (abs(zeta) + np.sqrt(1.0 + zeta * zeta))
                 cosine = 1.0 / np.sqrt(1.0 + t * t)
@@ -134,6 +136,7 @@ def cholesky(B, L):
     """Factor ``B = L L^T`` in place of L; return whether every pivot is safely positive."""
     never_inline()
     n = B.shape[0]
+    # A pivot of the size of its rounding error would make a step of any length.
     floor = 1e-14 * largest_entry(B)
     for i in range(n):
         for j in range(i + 1):

@@ -74,6 +74,8 @@ def polish(problem, on, m, held, u, F, J, H, size):
         d = np.zeros(n)
         if A.shape[0]:
             U, s, V = svd(A)
+            # Multipliers and the step across the face from one factorisation of its rows; what is
+            # below the cut is left at zero, so that both are the shortest.
             cut = RANK * largest(s)
             for c in range(n):
                 if s[c] > cut:
@@ -91,8 +93,10 @@ def polish(problem, on, m, held, u, F, J, H, size):
         L = lagrangian_hessian(H, lam)
         add_tangential_step(d, L, g, V, s, cut, max(largest_entry(L), largest_entry(H[total])))
         step = largest(d)
+        # Not on the way to a point nearby: the caller goes on without Newton's method.
         if not np.isfinite(step) or step > 1e3:
             return lam, np.inf
+        # Rounding errors do not shrink quadratically; without this the loop would chase them.
         if (step >= 0.5 * last and step < 1e-9) or step <= 1e-16:
             break
         add_multiple(u, 1.0, d)

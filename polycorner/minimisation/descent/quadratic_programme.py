@@ -12,6 +12,7 @@ def project_out(Q, R, count, w):
     """Split ``w`` into ``Q y + rest`` over an orthonormal basis; return ``(rest, R^-1 y, y)``."""
     never_inline()
     rest, y = w.copy(), np.zeros(count)
+    # Twice: one pass of Gram and Schmidt loses orthogonality where rows are nearly dependent.
     for _ in range(2):
         for j in range(count):
             part = 0.0
@@ -62,6 +63,7 @@ def most_violated(A, b, x, is_active, start, stop, equations):
         if is_active[i]:
             continue
         miss = slack(A, b, x, i)
+        # An equation is violated on either side.
         miss = -abs(miss) if equations else miss
         if miss < worst - 1e-13 * max(1.0, abs(b[i])):
             chosen, worst = i, miss
@@ -95,10 +97,12 @@ def solve_quadratic(L, g, A, b, equations):
     count, known, failed = np.int64(0), np.int64(0), False
     for _ in range(20 * (rows + n) + 20):
         p = most_violated(A, b, x, is_active, rows - equations, rows, True)
+        # Equations first: they never leave the active set again.
         if p < 0:
             p = most_violated(A, b, x, is_active, np.int64(0), rows - equations, False)
         if p < 0:
             break
+        # An equation that is violated from above enters as the inequality turned round.
         sign[p] = -1.0 if slack(A, b, x, p) > 0 else 1.0
         for k in range(n):
             W[p, k] *= sign[p]
@@ -116,6 +120,7 @@ def solve_quadratic(L, g, A, b, equations):
             full = np.inf
             if independent:
                 full = -sign[p] * slack(A, b, x, p) / (size * size)
+            # The row is a combination of active ones that cannot give way: no feasible point.
             if drop < 0 and not full < np.inf:
                 failed = True
                 break

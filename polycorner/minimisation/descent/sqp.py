@@ -53,6 +53,7 @@ def convexified(B, g, A, L):
     n = B.shape[0]
     if not max(largest_entry(B), largest(g)) < HUGE:
         return False
+    # Relative to the problem's size, so that the unit of energy does not matter.
     across, shift = 0.0, 1e-6 * max(largest_entry(B), largest(g))
     if shift < 1e-300:
         shift = 1e-300 if shift > 0.0 else 1.0
@@ -65,6 +66,8 @@ def convexified(B, g, A, L):
                     C[i, k] += across * A[j, i] * A[j, k]
         if cholesky(C, L):
             return True
+        # Once, and large: a curvature that is negative across the rows only is cured by it, and
+        # the step along them stays Newton's.
         if across == 0.0 and A.shape[0] > 0:
             across = 10.0 * n * largest_entry(B)
         else:
@@ -92,6 +95,7 @@ def is_uneven(problem, v, lam, F, J, H, size):
         top = max(top, abs(L[i, i]) / scales[i] ** 2)
     low, high = np.inf, 0.0
     for i in range(v.size):
+        # In natural units: what the scale would be if it were chosen here.
         bend = abs(L[i, i]) / scales[i] ** 2
         flat = not bend > CURVELESS * top
         scale = max(1.0, abs(v[i])) if flat else np.sqrt(top / bend) / scales[i]
@@ -117,6 +121,7 @@ def descend(problem, use, m, rows, u, size, limit):
     lam, on, before = np.zeros(rows - 1), np.zeros(m, np.bool_), np.zeros(m, np.bool_)
     u = u.copy()
     origin = u.copy()
+    # A start may lie far outside; later steps begin next to the set and need few linearisations.
     if not project(problem, use, m, u, F, J, H, size, np.int64(100)) or not np.isfinite(
         F[rows - 1]
     ):
@@ -128,12 +133,15 @@ def descend(problem, use, m, rows, u, size, limit):
         energy, g = F[rows - 1], J[rows - 1].copy()
         if not all_finite(J, H, lam, rows - 1):
             return STALLED, iteration, u, lam
+        # Contacts come and go at first: convexified across them, a step that opens one is short.
         if rows - 1 > m or iteration > PATIENCE:
             section, _, _, _ = normalised_rows(F, J, on if iteration > PATIENCE else nothing, m)
+        # With the multipliers of the last step: this step's are not known before it is solved.
         if not convexified(lagrangian_hessian(H, lam), g, section, L):
             return STALLED, iteration, u, lam
         A, b, keep, sizes = normalised_rows(F, J, use, m)
         for j in range(b.size):
+            # Within the tolerance a row is a contact: else steps would go into rounding errors.
             if abs(b[j]) < FEASIBLE:
                 b[j] = 0.0
         _, d, mult = solve_quadratic(L, g, A, b, equations_among(keep, m))
@@ -149,6 +157,7 @@ def descend(problem, use, m, rows, u, size, limit):
         settled = True
         for i in range(m):
             settled = settled and on[i] == before[i]
+        # Near the end, or with the contacts of the step before: Newton's method may finish.
         if reach < 1e-9 or (reach < 0.5 and settled):
             outcome, v, exact, ways = classify(problem, use, on, m, u, F, J, H, size, energy)
             if outcome == MINIMUM:
@@ -165,20 +174,24 @@ def descend(problem, use, m, rows, u, size, limit):
         slope = 0.0
         for k in range(n):
             slope += g[k] * d[k]
+        # The quadratic model is not trusted farther than the steps before it have been right.
         factor = min(1.0, cap / reach)
         accepted = False
         for _ in range(40):
             trial = plus(u, factor, d)
+            # Shorter steps cannot jump over a forbidden region of the size of a scale.
             blocked = factor * reach > 0.5 and crosses_wall(
                 problem, use, m, u, plus(trial, -1.0, u), F, J, H, size
             )
             if not blocked and project(problem, use, m, trial, F, J, H, size, np.int64(6)):
+                # At the bottom a decrease is smaller than the rounding error of the energy.
                 rounding = 1e-15 * (abs(energy) + largest(g))
                 if F[rows - 1] <= energy + 1e-4 * factor * slope + rounding:
                     accepted = True
                     break
             factor *= 0.5
         if not accepted:
+            # No shorter step is lower either: this is a stationary point, or nothing can be said.
             outcome, v, exact, ways = classify(problem, use, on, m, u, F, J, H, size, energy)
             if leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
                 for k in range(n):
