@@ -6,7 +6,7 @@ The oracle parametrises the set, or knows it as one without the walls.
 import numpy as np
 import pytest
 import sympy as sp
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from polycorner import Manifold, Polyhedron, SmoothFunction, certify, minima, minimise
@@ -82,6 +82,8 @@ def linear(n, slope):
 @pytest.mark.parametrize("n", [2, 3, 5, 10])
 @FEW
 @given(seed=seeds)
+@example(seed=19463)  # the circle falls by 0.0025 only where it touches a wall
+@example(seed=552)
 def test_a_unit_vector_with_bounds(n, method, seed):
     """On the sphere ``c.u`` is least at ``-c/|c|``; ``|u_i| <= 1`` is true there anyway."""
     rng = np.random.default_rng(seed)
@@ -92,6 +94,10 @@ def test_a_unit_vector_with_bounds(n, method, seed):
     ]
     D = Polyhedron(space(n), box, [quadric(n, "sphere", np.eye(n), np.zeros(n))])
     slope, start = rng.standard_normal((2, n))
+    # Nearer to a wall than the tolerance it counts as touched, though its gradient is not parallel;
+    # SciPy's search may already end beside one that is a little farther away.
+    beside = 1e-8 if method == "newton" else 1e-4
+    assume(abs(slope).max() < (1 - beside) * np.linalg.norm(slope))
     c = minimise(D, linear(n, slope), start / np.linalg.norm(start), method=method)
     assert c.verdict.name == "STRICT_MINIMUM"
     assert c.point == pytest.approx(-slope / np.linalg.norm(slope), abs=1e-6)

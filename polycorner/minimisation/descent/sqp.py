@@ -22,6 +22,7 @@ from polycorner.minimisation.descent.stationarity import (
     REJECTED,
     SADDLE,
     classify,
+    leave_bind,
     leave_flat,
     leave_saddle,
 )
@@ -170,6 +171,8 @@ def descend(problem, use, m, rows, u, size, limit):
                 uneven = is_uneven(problem, v, exact, F, J, H, size)
                 return (UNEVEN if uneven else LEVEL), iteration, v, exact
             if reach < 1e-9:
+                if leave_bind(problem, use, on, m, u, F, J, H, size, energy):
+                    continue
                 return STALLED, iteration, v if outcome != REJECTED else u, lam
         slope = 0.0
         for k in range(n):
@@ -196,6 +199,8 @@ def descend(problem, use, m, rows, u, size, limit):
             if leaves(problem, use, on, m, v, outcome, ways, F, J, H, size, energy):
                 for k in range(n):
                     u[k] = v[k]
+                continue
+            if outcome < SADDLE and leave_bind(problem, use, on, m, u, F, J, H, size, energy):
                 continue
             return (
                 (CONVERGED if outcome >= SADDLE else STALLED),

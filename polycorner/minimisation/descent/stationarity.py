@@ -32,6 +32,7 @@ RADII = (1e-3, 1e-2, 1e-1)  # steps in which flat directions are followed, in sc
 # Relative differences up to which values are the same, and gradients: curvatures above `CURVED`
 # gain less from such a difference than values may differ.
 SAME, PARALLEL = 1e-14, 1e-11
+BIND = 1e-4  # sine of an angle below which rows are taken for dependent where steps end
 MIXTURES = 4  # mixtures of flat directions to follow, per direction, where there are several
 
 
@@ -168,6 +169,36 @@ def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
                 v[i] = trial[i]
             return True
     return False
+
+
+@compiled
+def leave_bind(problem, use, on, m, v, F, J, H, size, energy):
+    """Move ``v`` downhill along a face with nearly dependent rows; return whether it got lower.
+
+    Where an inequality touches an equation, as a wall touches a circle, the linearised rows meet
+    halfway to the point of contact: every step is half as long as the one before, and none passes
+    the point, where there are no multipliers ([NW] 12.2).  Along the tangents that such rows have
+    in common steps are projected onto the set itself, which the point may not end.
+    """
+    never_inline()
+    evaluate(problem, v, F, J, H, size, False)
+    last = F.size - 1
+    A, b, _, _ = normalised_rows(F, J, on, m)
+    direction = J[last].copy()
+    if b.size:
+        _, s, V = svd(A)
+        for c in range(v.size):
+            part = 0.0
+            for k in range(v.size):
+                part += V[k, c] * J[last, k]
+            # Across the rows, but not across the small angles between them.
+            if s[c] > BIND * largest(s):
+                add_multiple(direction, -part, V[:, c])
+    # Without a slope there is no way down to look for.
+    if not 1e-9 * length(J[last]) < length(direction) < HUGE:
+        return False
+    way = plus(np.zeros(v.size), -1.0 / length(direction), direction)
+    return leave_saddle(problem, use, on, m, v, way, F, J, H, size, energy)
 
 
 @compiled
