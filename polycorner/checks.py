@@ -96,13 +96,15 @@ def whole(
     Traceback (most recent call last):
     ValueError: count: expected a whole number >= 1; got 0
     """
+    kind: type[Exception] = ValueError
+    if isinstance(value, bool) or not isinstance(value, int | Integral):  # the first is faster
+        kind = TypeError
+    else:
+        number = int(value)
+        if (least is None or number >= least) and (most is None or number <= most):
+            return number
     bounds = _bounds((">=", least), ("<=", None if most == MOST else most))
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        refuse(argument, f"a whole number{bounds}", value, TypeError)
-    number = int(value)
-    if (least is not None and number < least) or (most is not None and number > most):
-        refuse(argument, f"a whole number{bounds}", value)
-    return number
+    refuse(argument, f"a whole number{bounds}", value, kind)
 
 
 def real(
@@ -164,6 +166,8 @@ def real(
 
 def _as_double(value: object) -> tuple[float, bool]:
     """Return a real number as a double, NaN for what is none, and whether it is in its range."""
+    if type(value) is float:  # nearly always
+        return value, True
     try:
         number = isinstance(value, Real) and not isinstance(value, bool)
         return (float(value) if number else math.nan), True  # type: ignore[arg-type] # a Real

@@ -274,11 +274,11 @@ def _descend_union(
 ) -> Endpoint:
     """Descend in one branch of the and/or tree after another until none leads lower."""
     d = problem.polyhedron
-    everything = frozenset(range(problem.inequalities))
-    values = d.values(q).tolist()
-    # Parts that hold here need not lead to a point at which all of a branch does.
-    pieces = [*d.selections(values), *d.selections(values, np.inf)] if d.is_union else [everything]
-    pieces = list(dict.fromkeys(pieces))
+    pieces = [frozenset(range(problem.inequalities))]
+    if d.is_union:
+        values = d.values(q).tolist()
+        # Parts that hold here need not lead to a point at which all of a branch does.
+        pieces = [*dict.fromkeys([*d.selections(values), *d.selections(values, np.inf)])]
     for piece in pieces:
         end = descent(problem, piece, q, limit)
         if end.failure is not Verdict.INFEASIBLE:
@@ -375,7 +375,10 @@ def _diagnosing(method: Method, tolerances: Tolerances) -> Descent:
         end = plain(problem, piece, q, limit)
         if end.failure is not None and problem.rows - problem.inequalities > 2:
             end = _without_dependent(problem, piece, q, plain, limit, end, tolerances)
-        end = go_on(problem, piece, end, plain, limit, tolerances)
+        # Newton's method converges at stationary points only, beside which nothing is lower to
+        # first order; the others are believed less.
+        if method != "newton" or end.failure is not None:
+            end = go_on(problem, piece, end, plain, limit, tolerances)
         if end.failure is None and not end.flat:
             return end
         if end.failure is Verdict.INFEASIBLE:
