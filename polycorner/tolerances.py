@@ -1,6 +1,7 @@
 """The numbers that decide what counts as zero, equal or settled, and the boxes of searches."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from polycorner import checks
 
@@ -80,19 +81,7 @@ class Tolerances:
         """
         checks.real("tolerance", tolerance, above=0, below=1)
         checks.real("rank_tolerance", rank_tolerance, above=0, below=1)
-        s = tolerance / TOLERANCE
-        return cls(
-            zero=tolerance,
-            feasible=max(1e-10 * s, cls.rounding),
-            held=max(1e-11 * s**0.75, cls.rounding),
-            same=1e-6 * s**0.75,
-            near=1e-4 * s**0.5,
-            stationary=tolerance,
-            curvature=tolerance,
-            level=1e-9 * s,
-            rank=rank_tolerance,
-            dependent=rank_tolerance / 10,
-        )
+        return _belonging(float(tolerance), float(rank_tolerance))
 
     @property
     def corner(self) -> float:
@@ -174,3 +163,20 @@ class SearchOptions:
 
 DEFAULT = Tolerances()
 SEARCH = SearchOptions()
+
+
+@lru_cache(maxsize=64)
+def _belonging(tolerance: float, rank_tolerance: float) -> Tolerances:
+    s = tolerance / TOLERANCE
+    return Tolerances(
+        zero=tolerance,
+        feasible=max(1e-10 * s, Tolerances.rounding),
+        held=max(1e-11 * s**0.75, Tolerances.rounding),
+        same=1e-6 * s**0.75,
+        near=1e-4 * s**0.5,
+        stationary=tolerance,
+        curvature=tolerance,
+        level=1e-9 * s,
+        rank=rank_tolerance,
+        dependent=rank_tolerance / 10,
+    )
