@@ -89,7 +89,8 @@ def checked(function: F) -> F:
     def call(*given: Any, **named: Any) -> Any:
         kinds = _kinds(function)
         for (name, kind), value in zip(kinds.items(), given, strict=False):
-            kind.check(name, value)
+            if kind.test is not None and not kind.test(value):
+                kind.refuse(name, value)
         for name, value in named.items():
             if name in kinds:
                 kinds[name].check(name, value)
