@@ -1,6 +1,7 @@
 """What values look like in a shell and in a notebook: they fit a screen, however large they are."""
 
 import math
+import re
 from html.parser import HTMLParser
 
 import pytest
@@ -17,9 +18,12 @@ from polycorner.bodies import (
     polygon,
 )
 from polycorner.models import CirclesIn, LennardJones, PeriodicPacking, SphereCluster, TorusDisks
+from polycorner.proofs import corners, stationary_points
 
 SQUARE = polygon([[-1, -1], [1, -1], [1, 1], [-1, 1]], 0.1)
 STONE = compound({"a": SQUARE, "b": disc(0.5, at=[2, 0]), "c": capsule([0, 0], [0, 2], 0.2)})
+PLANE = Manifold.euclidean("x y")
+BOWL = Polyhedron(PLANE, {"disc": 4 - sum(c**2 for c in PLANE.symbols), "half": PLANE.symbols[1]})
 LINES, COLUMNS, LINE = 50, 130, 450
 
 
@@ -56,6 +60,8 @@ LARGE = {
     "disks": lambda: TorusDisks(5),
     "cluster": lambda: SphereCluster(9),
     "atoms": lambda: LennardJones(6),
+    "stationary points": lambda: stationary_points(BOWL, sum(PLANE.symbols), box=[(-3, 3)] * 2),
+    "corners": lambda: corners(BOWL, box=[(-3, 3)] * 2),
 }
 
 
@@ -94,6 +100,12 @@ def test_a_notebook_shows_tables(large):
     seen.feed(large._repr_html_())
     assert not seen.open
     assert 0 < seen.rows <= LINES
+
+
+def test_what_a_proved_list_says_is_its_representation():
+    """A generated one, with all fields, does not hide the one that is written."""
+    for name in ("stationary points", "corners"):
+        assert re.match(r"\w+List\(Proved: .* exactly \d", repr(LARGE[name]()))
 
 
 def test_few_coordinates_are_written_as_they_are_made():

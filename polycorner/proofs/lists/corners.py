@@ -110,7 +110,7 @@ class CornerPoint(EnclosedPoint):
     orbit: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CornerList(ProvedList[CornerPoint]):
     """Corners of a polyhedron in a box; see :func:`corners`.
 

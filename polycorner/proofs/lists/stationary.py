@@ -148,7 +148,7 @@ class ProvedList(Printed, Checked, Generic[P]):
         return save(path, self.record)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StationaryList(ProvedList[StationaryPoint]):
     """Stationary points of an energy on a polyhedron in a box; see :func:`stationary_points`.
 
