@@ -22,9 +22,9 @@ from polycorner.minimisation.descent.stationarity import (
     REJECTED,
     SADDLE,
     classify,
-    leave_bind,
     leave_flat,
     leave_saddle,
+    leave_tangency,
 )
 from polycorner.minimisation.descent.statuses import (
     CONVERGED,
@@ -171,7 +171,7 @@ def descend(problem, use, m, rows, u, size, limit):
                 uneven = is_uneven(problem, v, exact, F, J, H, size)
                 return (UNEVEN if uneven else LEVEL), iteration, v, exact
             if reach < 1e-9:
-                if leave_bind(problem, use, on, m, u, F, J, H, size, energy):
+                if leave_tangency(problem, use, on, m, u, F, J, H, size, energy):
                     continue
                 return STALLED, iteration, v if outcome != REJECTED else u, lam
         slope = 0.0
@@ -200,7 +200,7 @@ def descend(problem, use, m, rows, u, size, limit):
                 for k in range(n):
                     u[k] = v[k]
                 continue
-            if outcome < SADDLE and leave_bind(problem, use, on, m, u, F, J, H, size, energy):
+            if outcome < SADDLE and leave_tangency(problem, use, on, m, u, F, J, H, size, energy):
                 continue
             return (
                 (CONVERGED if outcome >= SADDLE else STALLED),

@@ -32,7 +32,7 @@ RADII = (1e-3, 1e-2, 1e-1)  # steps in which flat directions are followed, in sc
 # Relative differences up to which values are the same, and gradients: curvatures above `CURVED`
 # gain less from such a difference than values may differ.
 SAME, PARALLEL = 1e-14, 1e-11
-BIND = 1e-4  # sine of an angle below which rows are taken for dependent where steps end
+TANGENT = 1e-4  # sine of an angle below which rows are taken for dependent where steps end
 MIXTURES = 4  # mixtures of flat directions to follow, per direction, where there are several
 
 
@@ -172,7 +172,7 @@ def leave_saddle(problem, use, on, m, v, direction, F, J, H, size, energy):
 
 
 @compiled
-def leave_bind(problem, use, on, m, v, F, J, H, size, energy):
+def leave_tangency(problem, use, on, m, v, F, J, H, size, energy):
     """Move ``v`` downhill along a face with nearly dependent rows; return whether it got lower.
 
     Where an inequality touches an equation, as a wall touches a circle, the linearised rows meet
@@ -192,7 +192,7 @@ def leave_bind(problem, use, on, m, v, F, J, H, size, energy):
             for k in range(v.size):
                 part += V[k, c] * J[last, k]
             # Across the rows, but not across the small angles between them.
-            if s[c] > BIND * largest(s):
+            if s[c] > TANGENT * largest(s):
                 add_multiple(direction, -part, V[:, c])
     # Without a slope there is no way down to look for.
     if not 1e-9 * length(J[last]) < length(direction) < HUGE:
