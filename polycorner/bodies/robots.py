@@ -2,10 +2,9 @@
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from itertools import combinations
 from operator import mul
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,31 +13,21 @@ from numpy.typing import ArrayLike
 
 from polycorner import checks
 from polycorner.bodies import link_laws
-from polycorner.bodies.chains import (
-    Moving,
-    Pose,
-    dot,
-    moved,
-    still,
-)
+from polycorner.bodies.chains import Moving, Pose, dot, moved, still
 from polycorner.bodies.checking import check_together
-from polycorner.bodies.dynamics import friction_of
 from polycorner.bodies.frames import Frame
-from polycorner.bodies.kernels import together
-from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
-from polycorner.bodies.link_parts import CarriedPart, affine, carried_parts, gaps_of, touch
+from polycorner.bodies.laws import Coefficients, Restitution
+from polycorner.bodies.link_contacts import CarriedPart, LinkContacts, carried_parts
 from polycorner.bodies.link_trees import WORLD, LinkTree
 from polycorner.bodies.links import RobotJoint, RobotLink
 from polycorner.bodies.masses import Mass, stated_mass
-from polycorner.bodies.pairs import PlacedPart, Tree, apart, distances
 from polycorner.bodies.poses import Placement, coordinates, frame_of
 from polycorner.bodies.rigid_motions import number
 from polycorner.bodies.shapes import Body, Part
-from polycorner.bodies.walls import Wall, WallTouch, within
+from polycorner.bodies.walls import Wall
 from polycorner.checks import refuse
-from polycorner.formulas.functions import SmoothFunction
 from polycorner.kinds import checked
-from polycorner.motion.contacts import Friction, velocities
+from polycorner.motion.contacts import velocities
 from polycorner.motion.limits import rate_limits
 from polycorner.motion.system import System
 from polycorner.polyhedra.groups import AllOf
@@ -48,9 +37,6 @@ from polycorner.values import Checked, cached_property
 
 if TYPE_CHECKING:
     import sympy
-
-MOST_GAPS = 20_000
-Pairs = Iterable[tuple[CarriedPart, CarriedPart]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,78 +298,12 @@ class Robot(Checked):
     @cached_property
     def polyhedron(self) -> Polyhedron:
         """``D``, the placements without overlap and within the limits."""
-        return Polyhedron(self.manifold, AllOf(*self._contacts(excluded=True)))
-
-    def _contacts(self, *, excluded: bool) -> list[Tree]:
-        pairs = [*self._pairs()]
-        size = sum(gaps_of(one.part, two.part) for one, two in pairs)
-        if size > MOST_GAPS:
-            one, two = max(pairs, key=lambda pair: gaps_of(pair[0].part, pair[1].part))
-            msg = (
-                f"links: expected parts with at most {MOST_GAPS} gaps, of vertices, edges and "
-                f"faces; got {size}, of which {one.name!r} and {two.name!r} have "
-                f"{gaps_of(one.part, two.part)}; capsules have one each"
-            )
-            raise ValueError(msg)
-        found = [apart(self.manifold, *two, excluded=excluded) for two in self._both_placed(pairs)]
-        found += [met.gap for _, met in self._at_walls]
-        found = [*together(found), *self._limits]
-        if not found:
-            refuse("links", "something that links can touch, or limits of joints", [*self.links])
-        return found
-
-    def _both_placed(self, pairs: Pairs) -> Iterator[tuple[PlacedPart, PlacedPart]]:
-        """Yield pairs of parts, the first as joints place it in the axes of the second."""
-        return ((self._linked(a, b.carrier), self._linked(b, None)) for a, b in pairs)
-
-    def _linked(self, one: CarriedPart, start: str | None) -> PlacedPart:
-        """Return a part as it is placed from a carrier, or in its own."""
-        chain = None if start is None else self._tree.chain(start, one.carrier)
-        frame = Frame.FIXED if chain is None else Frame.LINKED
-        return PlacedPart(one.link, one.name, one.part, frame, None, (), np.zeros(3), chain=chain)
-
-    def _pairs(self) -> Iterator[tuple[CarriedPart, CarriedPart]]:
-        """Yield the parts that can touch; the first is one that moves."""
-        ignored = {frozenset(pair) for pair in self.ignored}
-        for one, two in combinations(self._carried, 2):
-            if one.carrier == two.carrier or frozenset((one.link, two.link)) in ignored:
-                continue
-            a, b = (self._tree.steps[c][0] if c else None for c in (one.carrier, two.carrier))
-            if one.is_linked and two.is_linked and (a == two.carrier or b == one.carrier):
-                continue  # links that a joint connects
-            yield (one, two) if one.carrier else (two, one)  # what stands in space is the second
+        return Polyhedron(self.manifold, AllOf(*self._contacts.gaps(excluded=True)))
 
     @cached_property
-    def _at_walls(self) -> list[tuple[CarriedPart, WallTouch]]:
-        """The gaps at walls, with the parts that they are of."""
-        ignored = {frozenset(pair) for pair in self.ignored}
-        return [
-            (one, met)
-            for name, wall in self.walls.items()
-            for one in self._carried
-            if one.carrier != WORLD and frozenset((one.link, name)) not in ignored
-            for met in within(self.manifold, name, wall, self._linked(one, WORLD))
-        ]
-
-    @cached_property
-    def _limits(self) -> list[SmoothFunction]:
-        """How far the joints are from their limits."""
-        found = []
-        for name, joint in self.joints.items():
-            other, rate, offset = joint.driven_by(name)
-            for sign, limit, word in ((1, joint.lower, "lower"), (-1, joint.upper, "upper")):
-                if joint.moves and math.isfinite(limit):
-                    numbers = sign * rate, sign * (offset - limit)
-                    function = SmoothFunction.member(
-                        affine(),
-                        "gap",
-                        self.manifold,
-                        parameters=numbers,
-                        reads=(other,),
-                        label=f"{name} {word}",
-                    )
-                    found.append(function)
-        return found
+    def _contacts(self) -> LinkContacts:
+        parts, ignored = tuple(self._carried), frozenset(map(frozenset, self.ignored))
+        return LinkContacts(self.manifold, self._tree, parts, self.walls, ignored)
 
     @checked
     def overlapping(self, q: ArrayLike) -> list[tuple[str, str]]:
@@ -392,14 +312,7 @@ class Robot(Checked):
         After these the links and free bodies that are beyond walls, with them: what stands on a
         wall is where it is meant to be.
         """
-        poses, point = self._poses(q), self.manifold.point(q)
-        found = [
-            (one.link, two.link)
-            for one, two in self._pairs()
-            if touch(*(x.part.moved(*poses[x.carrier][::-1]) for x in (one, two)))
-        ]
-        found += [(one.link, met.name) for one, met in self._at_walls if met.gap.value(point) < 0]
-        return [*dict.fromkeys(found)]
+        return self._contacts.overlapping(self.manifold.point(q), self._poses(q))
 
     # ------------------------------------------------------------------------------------ motion
 
@@ -473,7 +386,7 @@ class Robot(Checked):
             if step.kind == "free":
                 beyond = [m for c, m in inertias.items() if m and carrier in self._tree.path(c)]
                 kinetic += link_laws.along_norm(step, beyond, self._rates)
-        polyhedron = Polyhedron(self.manifold, AllOf(*self._contacts(excluded=False)))
+        polyhedron = Polyhedron(self.manifold, AllOf(*self._contacts.gaps(excluded=False)))
         if polyhedron.is_union:
             msg = (
                 "links: expected rounded links (radius > 0) for motion; two sharp polygons or "
@@ -483,7 +396,7 @@ class Robot(Checked):
         given = checks.mapping("torques", {} if torques is None else torques)
         checks.names("torques", given, self._tree.free)
         driven = link_laws.forces(self.joints, self._rates, given)
-        rubbing, bounces = self._laws(friction, rolling, restitution)
+        rubbing, bounces = self._contacts.laws(friction, rolling, restitution)
         laws = (*link_laws.joint_friction(self.joints, self._rates), *rubbing)
         bounds = checks.mapping("rates", {} if rates is None else rates)
         moving = {name: self._rates[name] for name in self._tree.free}
@@ -499,31 +412,6 @@ class Robot(Checked):
             limits={**rate_limits(moving, bounds), **further},
             nonholonomic={} if nonholonomic is None else nonholonomic,
         )
-
-    def _laws(
-        self, friction: Coefficients, rolling: Coefficients, restitution: Restitution
-    ) -> tuple[tuple[Friction, ...], dict[str, float]]:
-        """Return the friction at contacts, and the coefficients of restitution by name."""
-        pairs = self._both_placed(self._pairs())
-        touches = [t for two in pairs for t in distances(self.manifold, *two)]
-        walls = [met for _, met in self._at_walls]
-        meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
-        meetings += [Meeting(met.gap.name, met.member.body, met.name) for met in walls]
-        meetings += [Meeting(f.name, j := f.name.rpartition(" ")[0], j) for f in self._limits]
-        known = laws_of(friction, rolling, restitution, meetings, {**self.links, **self.bodies})
-        for m in meetings:
-            for argument, by_name in (("friction", known.friction), ("rolling", known.rolling)):
-                self._check_turning(argument, m, by_name.get(m.contact, (0.0, 0.0)))
-        return friction_of(self.manifold, touches, walls, known.friction, known.rolling), {
-            m.contact: known.restitution.get(m.contact, 0.0) for m in meetings
-        }
-
-    def _check_turning(self, argument: str, met: Meeting, given: tuple[float, float]) -> None:
-        """Raise for friction at a ball without coordinates of its rotation."""
-        for name in (met.one, met.two):
-            if given[0] and self._tree.loose.get(name) is Frame.SHIFTED:
-                missing = f"coordinates of all rotations (orientations='all') of {name!r}"
-                refuse(argument, missing, given[0])
 
     @cached_property
     def _rates(self) -> "dict[str, sympy.Symbol]":
