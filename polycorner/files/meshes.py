@@ -1,4 +1,4 @@
-"""Bodies from meshes of triangles: STL, OBJ, PLY, GLB and GLTF files.
+"""Bodies from meshes of triangles: STL, OBJ, PLY, GLB, GLTF and Collada files.
 
 Meshes are read by trimesh.  What is not convex is cut into convex parts by CoACD [CoACD], which on
 brackets, rings and cups needed fewer parts than V-HACD for the same volume, in less time, and draws
@@ -21,13 +21,14 @@ from polycorner import checks
 from polycorner.bodies.masses import Mass, mass_of
 from polycorner.bodies.shapes import Body, Part, capsule, sphere
 from polycorner.checks import missing_extra, refuse
+from polycorner.files.collada import plain
 from polycorner.files.safe_paths import content, name_of, within
 from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 from polycorner.values import Checked
 
-FORMATS = ("stl", "obj", "ply", "glb", "gltf")
+FORMATS = ("stl", "obj", "ply", "glb", "gltf", "dae")
 PARTS = ("convex", "hull", "exact")
 AT_ONCE = 1000  # triangles whose heights over all faces of a hull are compared at a time
 
@@ -105,10 +106,12 @@ def read_mesh(
     Parameters
     ----------
     path : path
-        An STL, OBJ, PLY, GLB or GLTF file, which its suffix tells.  Of a GLTF file buffers in its
-        folder are read as well; materials and textures are not.
+        An STL, OBJ, PLY, GLB, GLTF or Collada file (DAE, extra ``meshes``), which its suffix tells.
+        Of a GLTF file buffers in its folder are read as well; materials and textures are not.  Of a
+        Collada file nothing else is read; its axes are those of the body, whatever ``up_axis``.
     scale : float, optional
         Length of the file's unit, in the unit of the arrangement: 0.001 for millimetres in metres.
+        For a Collada file, which may state its unit, that of a metre.
     density : float, optional
         Mass per volume, in the units of the arrangement.
     parts : {"convex", "hull", "exact"}, optional
@@ -186,10 +189,12 @@ def load_mesh(path: str | os.PathLike[str], scale: float | Array, megabytes: flo
         refuse("path", expected, os.fspath(path))
     data = content("path", path, megabytes)
     beside = _buffers(about, data, Path(path).parent, megabytes) if kind == "gltf" else {}
+    options: Any = {"ignore_broken": False} if kind == "dae" else {"skip_materials": True}
+    if kind == "dae":
+        data, unit = plain(about, data, megabytes)
+        scale = unit * scale
     try:
-        scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=kind, resolver=beside, skip_materials=True
-        )
+        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, resolver=beside, **options)
         found = scene.to_mesh()
         points, faces = np.array(found.vertices, np.float64), np.array(found.faces, np.int64)
     except Exception as error:

@@ -25,6 +25,7 @@ from polycorner.bodies.shapes import Body, capsule, compound, polytope, sphere
 from polycorner.checks import missing_extra, refuse
 from polycorner.files.meshes import MeshOptions, capsule_around, convex_body, load_mesh
 from polycorner.files.safe_paths import content, name_of, within
+from polycorner.files.safe_xml import is_finite, parsed, place_of
 from polycorner.kinds import checked
 from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
@@ -231,67 +232,40 @@ def _planar(name: str, joint: RobotJoint) -> tuple[dict[str, RobotLink], dict[st
 
 
 def _parsed(about: str, data: bytes) -> Any:
-    """Return the root of an XML file, without its document type, entities or comments."""
-    from lxml import etree
-
-    parser = etree.XMLParser(
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
-    # Files of PyBullet declare the version 0.0, and others begin with an empty line.
-    if declared := re.match(rb"(\xef\xbb\xbf)?\s*<\?xml[^>]*\?>", data):
-        encoding = re.search(rb"encoding\s*=\s*[\"']([\w-]+)", declared[0])
-        if encoding is None or encoding[1].lower() in {b"utf-8", b"ascii", b"us-ascii"}:
-            data = b"\n" * declared[0].count(b"\n") + data[declared.end() :]
-    try:
-        root = etree.fromstring(data, parser)
-    except etree.XMLSyntaxError as error:
-        msg = f"{about}: line {error.lineno}: expected XML; got {error.msg}"
-        raise ValueError(msg) from error
-    if root.getroottree().docinfo.doctype:
-        refuse(about, "no document type, whose entities could be anything", "one")
+    """Return the root of a URDF file."""
+    root = parsed(about, data)
     for element in root.iter():
-        if not isinstance(element.tag, str):
-            refuse(_place(about, element), "no entities", str(element))
         if "xacro" in (element.prefix, element.tag.partition(":")[0]):
-            refuse(_place(about, element), "plain URDF, such as the program xacro makes", "xacro")
+            refuse(place_of(about, element), "plain URDF, such as the program xacro makes", "xacro")
     if root.tag != "robot":
-        refuse(_place(about, root), "the element <robot>", f"<{root.tag}>")
+        refuse(place_of(about, root), "the element <robot>", f"<{root.tag}>")
     return root
-
-
-def _place(about: str, element: Any) -> str:
-    return f"{about}: line {element.sourceline}: <{element.tag}>"
 
 
 def _check(about: str, element: Any) -> None:
     """Raise for missing attributes and elements, and attributes that are not numbers."""
-    place, tag = _place(about, element), element.tag
+    here, tag = place_of(about, element), element.tag
     for name in WORDS.get(tag, ()):
         if not element.get(name, "").strip():
-            refuse(place, f"the attribute {name}", dict(element.attrib))
+            refuse(here, f"the attribute {name}", dict(element.attrib))
     for name, sort in NUMBERS.get(tag, {}).items():
         given = element.get(name)
         if given is None and sort.startswith("?"):
             continue
         words, count = (given or "").replace(",", " ").split(), int(sort[-1])
         fits = len(words) == count or (tag == "mesh" and len(words) == 1)
-        if not fits or not all(map(_is_finite, words)):
+        if not fits or not all(map(is_finite, words)):
             what = "a finite number" if count == 1 else f"{count} finite numbers"
-            refuse(f"{place}: {name}", what, given)
+            refuse(f"{here}: {name}", what, given)
         element.set(name, " ".join(words))
     for name in NEEDED.get(tag, ()):
         if element.find(name) is None:
-            refuse(place, f"an element <{name}>", [child.tag for child in element])
+            refuse(here, f"an element <{name}>", [child.tag for child in element])
     if tag == "joint":
-        _check_kind(f"{place} {element.get('name')!r}", element)
+        _check_kind(f"{here} {element.get('name')!r}", element)
     if tag == "geometry" and [c.tag in KEPT["geometry"] for c in element] != [True]:
         shapes = checks.listed(f"<{name}>" for name in KEPT["geometry"])
-        refuse(place, f"one of {shapes}", [child.tag for child in element])
+        refuse(here, f"one of {shapes}", [child.tag for child in element])
     for child in element:
         if child.tag in KEPT.get(tag, ()):
             _check(about, child)
@@ -304,13 +278,6 @@ def _check_kind(place: str, joint: Any) -> None:
         refuse(place, f"the type {every}, of which chains are made", kind)
     if kind in {"revolute", "prismatic"} and joint.find("limit") is None:
         refuse(place, "an element <limit>", [child.tag for child in joint])
-
-
-def _is_finite(word: str) -> bool:
-    try:
-        return math.isfinite(float(word)) and "_" not in word
-    except ValueError:
-        return False
 
 
 def _plain(root: Any) -> bytes:

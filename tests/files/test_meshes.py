@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from polycorner.bodies import capsule, mass_of, polytope
 from polycorner.files import MeshOptions, read_mesh
 
-FORMATS = ("stl", "obj", "ply", "glb", "gltf")
+FORMATS = ("stl", "obj", "ply", "glb", "gltf", "dae")
 BRACKET = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3]]
 
 
