@@ -2,16 +2,19 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from polycorner import checks
 from polycorner.bodies.chains import LinkStep, Moving, clean, crossed, dot, times
+from polycorner.bodies.holds import Angle, Position
 from polycorner.bodies.links import RobotJoint
 from polycorner.bodies.masses import Mass
 from polycorner.bodies.rigid_motions import number, spin
+from polycorner.checks import refuse
 from polycorner.formulas.expressions import as_expression
-from polycorner.motion.contacts import Friction
+from polycorner.motion.contacts import Friction, time_symbol
 from polycorner.motion.friction import Interval
 
 if TYPE_CHECKING:
@@ -41,6 +44,26 @@ def forces(
             force += drive
         if force != 0:
             found[other] = found.get(other, sympy.S.Zero) + force
+    return found
+
+
+def followed(
+    joints: Mapping[str, RobotJoint], free: Sequence[str], motions: Any
+) -> "dict[str, sympy.Expr]":
+    """Return the equations of joints that move as functions of the time say."""
+    import sympy
+
+    given = checks.mapping("motions", {} if motions is None else motions)
+    checks.names("motions", given, free)
+    found = {}
+    for name, motion in given.items():
+        wished = as_expression(f"motions[{name!r}]", motion)
+        if wished.free_symbols - {time_symbol()}:
+            refuse(f"motions[{name!r}]", "a formula in the time, time_symbol()", motion)
+        q = sympy.Symbol(name, real=True)
+        turn = Angle(sympy.cos(q / 2), sympy.sin(q / 2), q)
+        one = turn if joints[name].kind == "continuous" else Position(q)
+        found[name] = one.away(wished)
     return found
 
 

@@ -323,6 +323,7 @@ class Robot(Checked):
         density: float = 1.0,
         masses: Mapping[str, Any] | None = None,
         torques: "Mapping[str, sympy.Expr] | None" = None,
+        motions: "Mapping[str, sympy.Expr] | None" = None,
         friction: Coefficients = 0.0,
         rolling: Coefficients = 0.0,
         restitution: Restitution = 0.0,
@@ -346,6 +347,10 @@ class Robot(Checked):
         torques : mapping from str to sympy.Expr, optional
             Torque or force of drives by joint, functions of coordinates, velocities and the time
             (:func:`~polycorner.motion.time_symbol`).  Beyond the effort of the joint it is cut off.
+        motions : mapping from str to sympy.Expr, optional
+            Angles or lengths of joints that are followed exactly, by a force of any size: functions
+            of the time, as :class:`Prescribed` without a limit.  Angles of continuous joints count
+            modulo a turn.  A state has to be on them and to move along.
         friction, rolling, restitution : optional
             Coefficients at all contacts, or by name, as in :meth:`Arrangement.system`: of a
             contact, ``"finger.v1-floor"``, of two things that touch, ``("finger", "ball")`` or
@@ -409,6 +414,7 @@ class Robot(Checked):
             laws,
             restitution=bounces,
             impact=impact,
+            rheonomic=link_laws.followed(self.joints, self._tree.free, motions),
             limits={**rate_limits(moving, bounds), **further},
             nonholonomic={} if nonholonomic is None else nonholonomic,
         )
