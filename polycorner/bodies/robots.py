@@ -38,6 +38,9 @@ from polycorner.values import Checked, cached_property
 if TYPE_CHECKING:
     import sympy
 
+BASES = ("fixed", "floating")
+ORIENTATIONS = ("needed", "all")
+
 
 @dataclass(frozen=True, eq=False)
 class Robot(Checked):
@@ -104,8 +107,8 @@ class Robot(Checked):
         for argument in ("links", "joints", "walls", "fixed", "bodies"):
             object.__setattr__(self, argument, dict(checks.mapping(argument, vars(self)[argument])))
         super().__post_init__()
-        checks.choice("base", self.base, ("fixed", "floating"))
-        checks.choice("orientations", self.orientations, ("needed", "all"))
+        checks.choice("base", self.base, BASES)
+        checks.choice("orientations", self.orientations, ORIENTATIONS)
         if not self.links:
             refuse("links", "at least one link", self.links)
         named = {"links": RobotLink, "joints": RobotJoint, "fixed": Body, "bodies": Body}

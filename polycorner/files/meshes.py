@@ -147,10 +147,13 @@ def read_mesh(
     >>> len(brick.body.markers), brick.mass.mass, brick.mass.inertia.diagonal().round(9).tolist()
     (8, 6.0, [6.5, 5.0, 2.5])
     """
+    checks.choice("parts", parts, PARTS)
     options = MeshOptions() if options is None else options
-    scale = checks.real("scale", scale, above=0)
-    about, mesh = f"path: {name_of(path)}", load_mesh(path, scale, options.megabytes)
-    density = checks.real("density", density, above=0)
+    scale, density = (
+        checks.real(name, x, above=0) for name, x in (("scale", scale), ("density", density))
+    )
+    about = f"path: {name_of(path)}"
+    mesh = load_mesh(about, path, scale, options.megabytes)
     is_closed = mesh.is_watertight and mesh.is_winding_consistent
     body = convex_body(about, mesh, parts, options)
     volumes = [float(_hull(about, part.points).volume) for part in body.parts.values()]
@@ -159,7 +162,7 @@ def read_mesh(
     with checks.about(about):
         mass = mass_of(body, density)
         if is_closed:
-            mass = Mass(density * volume, mesh.center_mass, density * mesh.moment_inertia)
+            mass = _filled(mesh, density)
     if centred:
         body = body.moved(-mass.centre)
         mass = Mass(mass.mass, np.zeros(3), mass.inertia)
@@ -179,15 +182,26 @@ def convex_body(about: str, mesh: Any, parts: str, options: MeshOptions) -> Body
     return Body({name: Part(hull, 0.0) for name, hull in zip(names, hulls, strict=True)})
 
 
-def load_mesh(path: str | os.PathLike[str], scale: float | Array, megabytes: float) -> Any:
+def _filled(mesh: Any, density: float) -> Mass:
+    """Return the mass of a closed mesh; trimesh takes small volumes for none, so that of size 1."""
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    unit = mesh.copy()
+    unit.vertices = mesh.vertices / size
+    mass = density * size**3
+    return Mass(mass * unit.volume, size * unit.center_mass, mass * size**2 * unit.moment_inertia)
+
+
+def load_mesh(
+    about: str, path: str | os.PathLike[str], scale: float | Array, megabytes: float
+) -> Any:
     """Return the triangles of a file as a ``trimesh.Trimesh`` with finite vertices."""
     import trimesh
 
-    about, kind = f"path: {name_of(path)}", Path(path).suffix.lower().removeprefix(".")
+    kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in FORMATS:
         expected = f"a file name that ends in {checks.listed(f'.{f}' for f in FORMATS)}"
         refuse("path", expected, os.fspath(path))
-    data = content("path", path, megabytes)
+    data = content(about, path, megabytes)
     beside = _buffers(about, data, Path(path).parent, megabytes) if kind == "gltf" else {}
     options: Any = {"ignore_broken": False} if kind == "dae" else {"skip_materials": True}
     if kind == "dae":
@@ -208,12 +222,17 @@ def load_mesh(path: str | os.PathLike[str], scale: float | Array, megabytes: flo
         refuse(about, expected, f"vertices {faces.min()} to {faces.max()}")
     if len(strange := np.flatnonzero(~np.isfinite(points).all(axis=1))):
         refuse(f"{about}: vertex {strange[0]}", "finite numbers", points[strange[0]])
-    mesh = trimesh.Trimesh(scale * points, faces, process=False)  # without colours and textures
-    size = float(np.ptp(mesh.vertices, axis=0).max())
-    if not 0 < size < math.inf:
-        refuse(about, "a body of finite size", size)
-    mesh.merge_vertices(digits_vertex=-math.floor(math.log10(DEFAULT.settled * size)))
-    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        points = scale * points
+        size = float(np.ptp(points, axis=0).max())
+        if not 0 < np.float64(size) ** 5 < math.inf:  # as inertias grow
+            refuse(about, "a body of finite size, whose inertia is in the range of doubles", size)
+    # Of size 1 meanwhile, as trimesh has lengths and areas that count as none.
+    mesh = trimesh.Trimesh(points / size, faces, process=False)  # without colours and textures
+    mesh.merge_vertices(digits_vertex=-math.floor(math.log10(DEFAULT.settled)))
+    kept = mesh.nondegenerate_faces(height=DEFAULT.settled) & mesh.unique_faces()
+    mesh.update_faces(kept)
+    mesh.vertices = size * mesh.vertices
     if not len(mesh.faces) or not mesh.extents.all():
         refuse(about, "a body that is not flat", f"{len(mesh.faces)} triangles in a plane")
     return mesh

@@ -110,10 +110,10 @@ def read_particles(path: str | os.PathLike[str], *, megabytes: float = 100.0) ->
     megabytes = checks.real("megabytes", megabytes, above=0)
     about, suffix = f"path: {name_of(path)}", Path(path).suffix.lower()
     if suffix == ".xyz":
-        return _xyz(about, content("path", path, megabytes))
+        return _xyz(about, content(about, path, megabytes))
     if suffix != ".gsd":
         refuse("path", "a file name that ends in .xyz or .gsd", os.fspath(path))
-    content("path", path, megabytes)
+    content(about, path, megabytes)
     return _gsd(about, path, megabytes)
 
 

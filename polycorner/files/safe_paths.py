@@ -9,7 +9,7 @@ MIB = 2**20
 
 
 def content(argument: str, path: str | os.PathLike[str], megabytes: float) -> bytes:
-    """Return the bytes of a file.
+    """Return the bytes of a file, which ``argument`` names.
 
     Raises
     ------
@@ -23,7 +23,7 @@ def content(argument: str, path: str | os.PathLike[str], megabytes: float) -> by
             refuse(argument, "an ordinary file", os.fspath(path))
         size = os.fstat(file.fileno()).st_size
         if size > MIB * megabytes:
-            refuse(f"{argument}: {name_of(path)}", f"at most {megabytes:g} MiB", "more")
+            refuse(argument, f"at most {megabytes:g} MiB", "more")
         return file.read(size)
 
 

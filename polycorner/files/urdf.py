@@ -20,7 +20,7 @@ from polycorner import checks
 from polycorner.bodies.holds import across
 from polycorner.bodies.links import KINDS, RobotJoint, RobotLink
 from polycorner.bodies.masses import Mass, mass_of
-from polycorner.bodies.robots import Robot
+from polycorner.bodies.robots import BASES, Robot
 from polycorner.bodies.shapes import Body, capsule, compound, polytope, sphere
 from polycorner.checks import missing_extra, refuse
 from polycorner.files.meshes import MeshOptions, capsule_around, convex_body, load_mesh
@@ -31,6 +31,7 @@ from polycorner.spaces.manifold import Array
 from polycorner.tolerances import DEFAULT
 
 SHAPES = ("capsules", "hulls", "parts")
+INERTIAS = ("file", "nearest", "shapes")
 # How many numbers each attribute has; those after "?" may be missing.
 NUMBERS: Mapping[str, Mapping[str, str]] = {
     "mass": {"value": "1"},
@@ -60,7 +61,9 @@ NEEDED = {
     "collision": ("geometry",),
     "inertial": ("mass", "inertia"),
 }
+POSITIVE = ("box", "sphere", "cylinder", "capsule")  # whose numbers are
 LOOSE = ("planar", "floating")  # joints with several coordinates
+SEVERAL = ("link", "joint", "collision")
 KEPT = {
     "robot": ("link", "joint"),
     "link": ("inertial", "collision"),
@@ -162,11 +165,16 @@ def read_urdf(
     except ImportError:
         missing = missing_extra("yourdfpy", "robots")
         raise missing from None
-    if sides is not None:
-        checks.whole("sides", sides, least=3)
+    for argument, word, known in (
+        ("shapes", shapes, SHAPES), ("inertias", inertias, INERTIAS), ("base", base, BASES)
+    ):  # fmt: skip
+        checks.choice(argument, word, known)
     options = MeshOptions() if options is None else options
+    _check_sides(sides, options.vertices)
+    if folder is not None and not Path(folder).is_dir():
+        refuse("folder", "a folder that exists", os.fspath(folder))
     about, file = f"path: {name_of(path)}", Path(path)
-    root = _parsed(about, content("path", path, options.megabytes))
+    root = _parsed(about, content(about, path, options.megabytes))
     _check(about, root)
     inner = _plain(root)
     try:
@@ -207,6 +215,13 @@ def read_urdf(
         return replace(robot, ignored=[*robot.ignored, *robot.overlapping(robot.home)])
 
 
+def _check_sides(sides: int | None, vertices: int) -> None:
+    """Raise for prisms that are none, or have more vertices than parts may have."""
+    if sides is not None and checks.whole("sides", sides, least=3) > vertices // 2:
+        expected = f"at most {vertices // 2}, as MeshOptions(vertices={vertices}) has it"
+        refuse("sides", expected, sides)
+
+
 def _check_floating(joint: Any, robot: Any, parent: RobotLink) -> None:
     """Raise unless a joint that floats leads from a link that is nothing but space to the rest."""
     others = (j for j in robot.joints if j is not joint and joint.parent in {j.parent, j.child})
@@ -245,6 +260,25 @@ def _parsed(about: str, data: bytes) -> Any:
 def _check(about: str, element: Any) -> None:
     """Raise for missing attributes and elements, and attributes that are not numbers."""
     here, tag = place_of(about, element), element.tag
+    _check_attributes(here, element)
+    for name in KEPT.get(tag, ()):
+        if name not in SEVERAL and (count := len(element.findall(name))) > 1:
+            refuse(here, f"one element <{name}> at most", count)
+    for name in NEEDED.get(tag, ()):
+        if element.find(name) is None:
+            refuse(here, f"an element <{name}>", [child.tag for child in element])
+    if tag == "joint":
+        _check_kind(f"{here} {element.get('name')!r}", element)
+    if tag == "geometry" and [c.tag in KEPT["geometry"] for c in element] != [True]:
+        shapes = checks.listed(f"<{name}>" for name in KEPT["geometry"])
+        refuse(here, f"one of {shapes}", [child.tag for child in element])
+    for child in element:
+        if child.tag in KEPT.get(tag, ()):
+            _check(about, child)
+
+
+def _check_attributes(here: str, element: Any) -> None:
+    tag = element.tag
     for name in WORDS.get(tag, ()):
         if not element.get(name, "").strip():
             refuse(here, f"the attribute {name}", dict(element.attrib))
@@ -257,18 +291,9 @@ def _check(about: str, element: Any) -> None:
         if not fits or not all(map(is_finite, words)):
             what = "a finite number" if count == 1 else f"{count} finite numbers"
             refuse(f"{here}: {name}", what, given)
+        if tag in POSITIVE and min(map(float, words)) <= 0:
+            refuse(f"{here}: {name}", "a number > 0" if count == 1 else "numbers > 0", given)
         element.set(name, " ".join(words))
-    for name in NEEDED.get(tag, ()):
-        if element.find(name) is None:
-            refuse(here, f"an element <{name}>", [child.tag for child in element])
-    if tag == "joint":
-        _check_kind(f"{here} {element.get('name')!r}", element)
-    if tag == "geometry" and [c.tag in KEPT["geometry"] for c in element] != [True]:
-        shapes = checks.listed(f"<{name}>" for name in KEPT["geometry"])
-        refuse(here, f"one of {shapes}", [child.tag for child in element])
-    for child in element:
-        if child.tag in KEPT.get(tag, ()):
-            _check(about, child)
 
 
 def _check_kind(place: str, joint: Any) -> None:
@@ -412,12 +437,11 @@ class _Shaper:
                 start = self.folder
         file = within(place, self.folder, reference, start)
         if not file.is_file():
-            refuse(place, f"a file in {self.folder}", mesh.filename)
+            refuse(place, f"a file in the folder {self.folder.resolve()}", mesh.filename)
         scale = np.ones(3) if mesh.scale is None else mesh.scale * np.ones(3)
         if not np.all(scale):
             refuse(place, "a scale without zeros", scale)
-        with checks.about(f"mesh {file.name}"):
-            found = load_mesh(file, scale, self.options.megabytes)
+        found = load_mesh(f"mesh {file.name}", file, scale, self.options.megabytes)
         if self.shapes == "capsules":
             return capsule_around(found.vertices, f"mesh {file.name}")
         parts = "hull" if self.shapes == "hulls" else "convex"

@@ -197,6 +197,32 @@ def test_damaged_files_are_read_or_refused_in_a_sentence(tmp_path_factory, suffi
         assert np.isfinite(found.body.markers).all()
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1e-5, 1e3, 1e12])
+def test_the_unit_of_length_is_of_no_account(tmp_path, unit):
+    """Masses grow with the third power of lengths, inertias with the fifth."""
+    placed(trimesh.creation.box([1, 2, 3]).subdivide()).export(tmp_path / "brick.stl")
+    one, other = (read_mesh(tmp_path / "brick.stl", scale=scale) for scale in (1.0, unit))
+    np.testing.assert_allclose(other.body.markers / unit, one.body.markers, atol=1e-6)
+    assert other.mass.mass / unit**3 == pytest.approx(one.mass.mass)
+    np.testing.assert_allclose(other.mass.centre / unit, one.mass.centre, atol=1e-6)
+    np.testing.assert_allclose(other.mass.inertia / unit**5, one.mass.inertia, atol=1e-6)
+
+
+ARGUMENTS = [
+    ({"parts": "konvex"}, "parts: expected 'convex', 'hull' or 'exact'; got 'konvex'"),
+    ({"scale": 1e100}, r"path: brick\.stl: expected a body of finite size, .*got 3\.0"),
+    ({"scale": 1e300}, r"path: brick\.stl: expected a body of finite size"),
+    ({"scale": 1e-200}, r"path: brick\.stl: expected a body of finite size"),
+]
+
+
+@pytest.mark.parametrize(("given", "words"), ARGUMENTS)
+def test_arguments_that_mean_nothing_are_refused(tmp_path, given, words):
+    trimesh.creation.box([1, 2, 3]).export(tmp_path / "brick.stl")
+    with pytest.raises(ValueError, match=f"^{words}"):
+        read_mesh(tmp_path / "brick.stl", **given)
+
+
 TRIANGLES = b"f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
 HOSTILE = {
     "huge.stl": b"x" * 80 + (2**32 - 1).to_bytes(4, "little") + b"\0" * 50,

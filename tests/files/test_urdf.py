@@ -236,12 +236,19 @@ WRONG = {
         ('<mass value="1_0"/>', "value: expected a finite number"),
         ("<mass/>", "value: expected a finite number; got None"),
         ("", "line {inertial}: <inertial>: expected an element <mass>"),
+        (
+            '<mass value="1"/><mass value="2"/>',
+            "line {inertial}: <inertial>: expected one element <mass> at most; got 2",
+        ),
         ('<mass value="-1"/>', "link 'upper': mass"),
     ],
     'ixx="0.05" ': [("", "<inertia>: ixx: expected a finite number; got None")],
     '<box size="0.4 0.4 0.1"/>': [
         ('<box size="0.4 0.4"/>', "line {line}: <box>: size: expected 3 finite numbers"),
-        ('<box size="0.4 0.4 0"/>', "link 'base link': collision 1: vertices"),
+        ('<box size="0.4 0.4 0"/>', "line {line}: <box>: size: expected numbers > 0; got"),
+        ('<box size="-1 1 1"/>', "<box>: size: expected numbers > 0; got '-1 1 1'"),
+        ('<sphere radius="0"/>', "<sphere>: radius: expected a number > 0; got '0'"),
+        ('<cylinder radius="1" length="-1"/>', "<cylinder>: length: expected a number > 0"),
         ("<cone/>", "line {line}: <geometry>: expected one of <box>, <sphere>"),
         ("", "line {line}: <geometry>: expected one of"),
     ],
@@ -258,6 +265,7 @@ WRONG = {
     '<axis xyz="0 1 0"/>': [('<axis xyz="0 0 0"/>', "joint 'elbow': axis: expected a direction")],
     '<limit lower="-1.5" upper="2" effort="30" velocity="3"/>': [
         ("", "<joint> 'elbow': expected an element <limit>"),
+        ('<limit effort="1"/><limit effort="2"/>', "<joint>: expected one element <limit> at most"),
         ('<limit lower="3" upper="2"/>', "joint 'elbow': upper: expected a limit above"),
     ],
     '<mimic joint="elbow"': [('<mimic joint="x"', "joint 'finger': mimic: expected")],
@@ -286,6 +294,21 @@ def test_what_is_wrong_is_said_with_file_and_place(written, old, new, words):
     words = words.replace("{line}", str(line)).replace("{inertial}", str(line - 2))
     with pytest.raises(ValueError, match=rf"^path: arm\.urdf: .*{words}"):
         read_urdf(written(ARM.replace(old, new, 1)))
+
+
+ARGUMENTS = [
+    ({"shapes": "boxes"}, "shapes: expected 'capsules', 'hulls' or 'parts'; got 'boxes'"),
+    ({"inertias": "none"}, "inertias: expected 'file', 'nearest' or 'shapes'; got 'none'"),
+    ({"base": "free"}, "base: expected 'fixed' or 'floating'; got 'free'"),
+    ({"sides": 33}, r"sides: expected at most 32, as MeshOptions\(vertices=64\) has it; got 33"),
+    ({"folder": "nowhere"}, "folder: expected a folder that exists; got 'nowhere'"),
+]
+
+
+@pytest.mark.parametrize(("given", "words"), ARGUMENTS)
+def test_arguments_that_mean_nothing_are_refused(written, given, words):
+    with pytest.raises(ValueError, match=f"^{words}"):
+        read_urdf(written(), **given)
 
 
 def test_bombs_and_other_documents_are_refused(written):
