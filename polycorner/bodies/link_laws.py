@@ -25,7 +25,10 @@ Rates = Mapping[str, "sympy.Symbol"]
 
 
 def forces(
-    joints: Mapping[str, RobotJoint], rates: Rates, torques: "Mapping[str, sympy.Expr]"
+    joints: Mapping[str, RobotJoint],
+    coordinates: "Sequence[sympy.Symbol]",
+    rates: Rates,
+    torques: "Mapping[str, sympy.Expr]",
 ) -> "dict[str, sympy.Expr]":
     """Return the forces of damping and of drives, which reach as far as the effort of the joint."""
     import sympy
@@ -38,6 +41,10 @@ def forces(
         force = -number(joint.damping * rate**2) * rates[other]
         if name in torques:
             drive = as_expression(f"torques[{name!r}]", torques[name])
+            known = {s.name for s in (*coordinates, *rates.values(), time_symbol())}
+            if unknown := sorted({s.name for s in drive.free_symbols} - known):
+                what = "a formula in coordinates, velocities and time_symbol()"
+                refuse(f"torques[{name!r}]", what, unknown[0])
             if math.isfinite(joint.effort):
                 most = number(joint.effort)
                 drive = sympy.Max(-most, sympy.Min(most, drive))

@@ -33,6 +33,13 @@ class RobotLink(Checked):
     body: Body | None = None
     mass: Mass | None = None
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.body is not None and self.body.dimension != 3:
+            refuse("body", "a body in space", self.body)
+        if self.mass is not None and len(self.mass.centre) != 3:
+            refuse("mass", "a mass in space, with a centre (3,)", self.mass)
+
 
 @dataclass(frozen=True, eq=False)
 class RobotJoint(Checked):
@@ -43,7 +50,7 @@ class RobotJoint(Checked):
     parent, child : str
         The links.
     kind : {"revolute", "continuous", "prismatic", "fixed"}
-        It turns between limits, or without, slides, or holds.
+        It turns between limits, or without end, slides, or holds.
     origin : (3,) array
         The joint, and with it the child at zero, in the axes of the parent.
     turn : (3, 3) array
@@ -59,7 +66,8 @@ class RobotJoint(Checked):
     effort : float
         The largest torque or force of a drive.
     follows : (str, float, float), optional
-        Another joint, a rate and an offset: it stands at ``rate q + offset`` of the other's ``q``.
+        Another joint, a rate, not zero, and an offset: it stands at ``rate q + offset`` of the
+        other's ``q``.
     """
 
     parent: str
@@ -84,10 +92,10 @@ class RobotJoint(Checked):
             object.__setattr__(self, name, given)
         if not np.allclose(self.turn @ self.turn.T, np.eye(3)) or np.linalg.det(self.turn) < 0:
             refuse("turn", "the matrix of a rotation", self.turn)
-        length = float(np.linalg.norm(self.axis))
-        if length == 0:
+        if not self.axis.any():
             refuse("axis", "a direction, not zero", self.axis)
-        object.__setattr__(self, "axis", clean(self.axis / length))
+        along = self.axis / np.abs(self.axis).max()
+        object.__setattr__(self, "axis", clean(along / np.linalg.norm(along)))
         for name in ("damping", "friction"):
             object.__setattr__(self, name, checks.real(name, getattr(self, name), least=0))
         for name in ("lower", "upper"):
@@ -96,7 +104,15 @@ class RobotJoint(Checked):
         object.__setattr__(self, "effort", effort)
         if not self.lower < self.upper:
             refuse("upper", f"a limit above the lower one, {self.lower:g}", self.upper)
+        limited = math.isfinite(self.lower) or math.isfinite(self.upper)
+        if self.kind == "continuous" and limited:
+            refuse("kind", "'revolute' for a joint with limits", self.kind)
         super().__post_init__()
+        if self.follows is not None:
+            _, rate, offset = self.follows
+            if checks.real("follows", rate) == 0:
+                refuse("follows", "a rate that is not zero", rate)
+            checks.real("follows", offset)
 
     @property
     def moves(self) -> bool:

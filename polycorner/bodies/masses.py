@@ -115,6 +115,8 @@ def stated_mass(name: str, body: Body, masses: Mapping[str, Any], density: float
     if not isinstance(mass, Mass):
         expected = "a number, or a Mass, such as Mass(1.0, [0.0, 0.0], 0.5)"
         refuse(f"masses[{name!r}]", expected, mass, TypeError)
+    if len(mass.centre) != body.dimension:
+        refuse(f"masses[{name!r}]", f"a centre of {body.dimension} numbers", mass)
     return mass
 
 

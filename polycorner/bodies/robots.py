@@ -125,12 +125,21 @@ class Robot(Checked):
         if twice := set(self.links) & set(self.bodies):
             refuse("bodies", "names that no link has", min(twice))
         self._tree.check()
+        self._check_names()
         names = {*known, *self.bodies, *self.fixed, *self.walls}
         for pair in self.ignored:
-            if len(pair) != 2:
-                refuse("ignored", "pairs of names", pair)
+            if len(set(pair)) != 2:
+                refuse("ignored", "pairs of two names", pair)
             checks.names("ignored", pair, names)
         object.__setattr__(self, "ignored", tuple(map(tuple, self.ignored)))
+
+    def _check_names(self) -> None:
+        """Raise for joints called like something else that has coordinates or coefficients."""
+        kinds = {**self._tree.loose, **({self.root: Frame.ROTATED} if self._tree.floats else {})}
+        own = {x for name, kind in kinds.items() for x in kind.variables(name, 3)}
+        if twice := {*self.joints} & {*self.bodies, *self.fixed, *self.walls, *own}:
+            expected = "names that no body, wall, or coordinate of a body has"
+            refuse("joints", expected, min(twice))
 
     @checked
     def among(
@@ -144,8 +153,8 @@ class Robot(Checked):
     ) -> "Robot":
         """Return the robot with more around it, and more pairs that do not touch.
 
-        Free bodies are in one polyhedron and one system with it.  ``orientations`` replaces those
-        of the robot, if it is given.
+        Free bodies are in one polyhedron and one system with it.  What has a name that is taken
+        replaces the other; ``orientations`` replaces those of the robot, if it is given.
         """
         return replace(
             self,
@@ -233,7 +242,7 @@ class Robot(Checked):
         floats = int(self.base == "floating")
         factors = [*own[:floats], *joints, *own[floats:]]
         if not factors:
-            refuse("joints", "a joint that moves", self.joints)
+            refuse("joints", "a joint that moves", [*self.joints])
         return reduce(mul, factors)
 
     def _reach(self, link: str) -> float:
@@ -382,6 +391,8 @@ class Robot(Checked):
             refuse("gravity", "3 finite numbers", gravity)
         checks.real("density", density, above=0)
         given = checks.mapping("masses", {} if masses is None else masses)
+        if own := sorted(set(given) & set(self.links)):
+            refuse("masses", "names of free bodies, as links have masses of their own", own[0])
         checks.names("masses", given, self.bodies)
         kinetic = potential = sympy.S.Zero
         inertias = self._inertias(given, density)
@@ -403,7 +414,7 @@ class Robot(Checked):
             raise NotImplementedError(msg)
         given = checks.mapping("torques", {} if torques is None else torques)
         checks.names("torques", given, self._tree.free)
-        driven = link_laws.forces(self.joints, self._rates, given)
+        driven = link_laws.forces(self.joints, self.manifold.symbols, self._rates, given)
         rubbing, bounces = self._contacts.laws(friction, rolling, restitution)
         laws = (*link_laws.joint_friction(self.joints, self._rates), *rubbing)
         bounds = checks.mapping("rates", {} if rates is None else rates)
