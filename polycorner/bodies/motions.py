@@ -201,6 +201,8 @@ def poses_of(arrangement: Any, motion: Any, argument: str = "motion") -> Poses:
     if isinstance(motion, Trajectory):
         return _moving(argument, arrangement, motion)
     q = _points(argument, arrangement, motion)
+    if not len(q):
+        refuse(argument, "at least one point", "none")
     return _posed(arrangement, by_kind(arrangement, q), np.arange(len(q), dtype=np.float64))
 
 

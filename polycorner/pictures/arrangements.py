@@ -18,7 +18,9 @@ from numpy.typing import ArrayLike
 from polycorner.bodies.arrangement import Arrangement
 from polycorner.bodies.frames import AXES
 from polycorner.bodies.lattices import Lattice
-from polycorner.bodies.motions import Poses, poses_of
+from polycorner.bodies.motions import Poses
+from polycorner.bodies.posed import poses_in
+from polycorner.bodies.robots import Robot
 from polycorner.bodies.shapes import Body
 from polycorner.bodies.sizes import Resized
 from polycorner.bodies.surfaces import outline, surface
@@ -45,7 +47,7 @@ LIGHT = LightSource(azdeg=315, altdeg=50)
 
 @checked
 def draw_arrangement(
-    arrangement: Arrangement | Resized,
+    arrangement: Arrangement | Resized | Robot,
     points: ArrayLike,
     *,
     titles: Sequence[str] | None = None,
@@ -64,7 +66,8 @@ def draw_arrangement(
 
     Parameters
     ----------
-    arrangement : Arrangement, or polyhedron of :func:`~polycorner.bodies.thinned` or `scaled`
+    arrangement : Arrangement, Robot, or Resized
+        The last of :func:`~polycorner.bodies.thinned` or `scaled`.
     points : (N,), (T, N) or (T, n, k) array
         The last for ``n`` bodies like one, such as ``path.q[[-1]]`` of a motion.
     titles : sequence of str, optional
@@ -88,12 +91,14 @@ def draw_arrangement(
     """
     if isinstance(arrangement, Resized):
         places = np.atleast_2d(arrangement.manifold.points(points, "points"))
-        each = [(arrangement.at(q), q[:-1]) for q in places]
+        each: list[Any] = [(arrangement.at(q), q[:-1]) for q in places]
     else:
         each = [(arrangement, points)]
-    several = [poses_of(*one, "points") for one in each]
+    several = [poses_in(model, q, "points") for model, q in each]
     marks = [
-        m for poses, (_, q) in zip(several, each, strict=True) for m in _marks(poses, q, contacts)
+        mark
+        for poses, (model, q) in zip(several, each, strict=True)
+        for mark in _marks(poses, model, q, contacts)
     ]
     count, poses = len(marks), several[0]
     if titles is not None and len(titles) != count:
@@ -138,13 +143,17 @@ def grid_of(
         if k < count:
             poses, at = shown[k]
             (draw_space if space else draw_plane)(pane, poses, at, window)
+            if space:
+                pane.set_box_aspect((1, 1, 1), zoom=0.9 if framed else 1.15)
             _annotate(pane, poses.placed(at) if named else {}, marks[k], forces, window)
             if titles is not None:
                 pane.set_title(titles[k], fontsize=9)
     return figure
 
 
-def _marks(poses: Poses, points: ArrayLike, contacts: Any) -> list[Array]:
+def _marks(
+    poses: Poses, model: Arrangement | Robot, points: ArrayLike, contacts: Any
+) -> list[Array]:
     """Return the points ``(m, d)`` that are marked in each picture."""
     d, count = poses.arrangement.dimension, len(poses)
     if contacts is None or contacts is False:
@@ -156,8 +165,7 @@ def _marks(poses: Poses, points: ArrayLike, contacts: Any) -> list[Array]:
     if np.ndim(points) > 2:
         refuse("contacts", "points (m, d), where bodies are repeated", contacts)
     places = np.atleast_2d(np.asarray(points, dtype=np.float64))
-    polyhedron = poses.arrangement.polyhedron
-    closed = [stratum_at(polyhedron, q, tolerance=DEFAULT.same).active for q in places]
+    closed = [stratum_at(model.polyhedron, q, tolerance=DEFAULT.same).active for q in places]
     touching = tuple(tuple(((0,), name, 0.0) for name in some) for some in closed)
     seen = poses.touched(touching)
     return [seen.marks(k) for k in range(count)]
@@ -360,7 +368,6 @@ def draw_space(axes: Any, poses: Poses, k: int, window: Array) -> None:
     if lines := wall_lines(poses.arrangement, window):
         axes.add_collection3d(Line3DCollection(lines, colors=FIXED, linewidths=0.7, zorder=1))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect((1, 1, 1), zoom=0.95 if axes.axison else 1.5)
 
 
 def wall_lines(arrangement: Arrangement, window: Array) -> list[Array]:

@@ -17,6 +17,8 @@ from matplotlib.figure import Figure
 from polycorner.atomic import write_atomically
 from polycorner.bodies.arrangement import Arrangement
 from polycorner.bodies.motions import Motion, Poses, poses_of
+from polycorner.bodies.posed import poses_in
+from polycorner.bodies.robots import Robot
 from polycorner.checks import real, reals, refuse, whole
 from polycorner.kinds import checked
 from polycorner.models.spheres import SphereCluster
@@ -194,7 +196,7 @@ class _Space:
 
 @checked
 def film(
-    arrangement: Arrangement,
+    arrangement: Arrangement | Robot,
     motion: Motion,
     path: str | os.PathLike[str] | None = None,
     *,
@@ -210,7 +212,7 @@ def film(
 
     Parameters
     ----------
-    arrangement : Arrangement
+    arrangement : Arrangement or Robot
         That moves; its bodies may be repeated.
     motion : Trajectory or array
         A motion of its system, or points ``(T, N)``, of bodies like one ``(T, n, k)``, one in a
@@ -223,7 +225,7 @@ def film(
     speed : float, optional
         Seconds of the motion that are shown in one second: 0.1 is slow motion.
     size : int, optional
-        Pixels of each side of a GIF or MP4.
+        Pixels of each side of a GIF or MP4, 16 to 8192.
     contacts : bool, optional
         Whether contacts that touch are marked.
     title : str, optional
@@ -246,7 +248,7 @@ def film(
     >>> len(shown.poses), shown.page[:15]
     (26, '<!DOCTYPE html>')
     """
-    poses = poses_of(arrangement, motion)
+    poses = poses_in(arrangement, motion)
     made = film_of(poses, fps=fps, speed=speed, size=size, contacts=contacts, title=title)
     if path is not None:
         made.save(Path(path))
@@ -267,7 +269,7 @@ def film_of(
         poses,
         whole("fps", fps, least=1),
         real("speed", speed, above=0),
-        whole("size", size, least=16),
+        whole("size", size, least=16, most=8192),
         contacts,
         title,
     )

@@ -20,6 +20,7 @@ FINE = 2  # pixels computed for each one that is shown, along each side
 ELEVATION, AZIMUTH = math.radians(20), math.radians(-60)  # of the eye
 LIGHT = np.array([-0.45, 0.7, 0.9]) / math.hypot(0.45, 0.7, 0.9)  # right, up, towards the eye
 BAND = 0.06  # half the width of the band around a ball that turns, in radii
+EDGE = 0.4  # brightness of the edges of sharp parts
 DARK = 0.45  # brightness out of the light, which is that of a band
 
 
@@ -68,7 +69,10 @@ class Raster:
             for face, normal in zip(facets.faces, normals, strict=True):
                 if normal[2] > 0:
                     self._face(points[list(face)], normal, part.radius, tint)
-        if part.radius > 0:
+        if part.radius == 0:
+            for i, j in edges:  # which faces of one brightness do not show
+                self._line(points[[i, j]] + [0.0, 0.0, 2 * self.pixel], EDGE * tint)
+        else:
             for point in points:
                 self.ball(point, part.radius, tint)
             for i, j in edges:
@@ -82,18 +86,21 @@ class Raster:
     def lines(self, lines: Iterable[Array], colour: str) -> None:
         """Draw polylines, where nothing hides them."""
         for line in lines:
-            ends = line @ self.frame
-            steps = np.linalg.norm(np.diff(ends[:, :2], axis=0), axis=1) / (0.7 * self.pixel)
-            at = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1))])
-            spread = np.linspace(0, at[-1], math.ceil(at[-1]) + 1)
-            dots = np.stack([np.interp(spread, at, column) for column in ends.T], axis=1)
-            i, j = (self._at(k, dots[:, k]) for k in (1, 0))
-            seen = (i >= 0) & (i < len(self.y)) & (j >= 0) & (j < len(self.x))
-            i, j, z = i[seen], j[seen], dots[seen, 2]
-            nearer = z > self.depth[i, j]
-            self.colour[i[nearer], j[nearer]] = to_rgb(colour)
+            self._line(line @ self.frame, np.array(to_rgb(colour)))
 
     # ------------------------------------------------------------------------------ the pieces
+
+    def _line(self, ends: Array, tint: Array) -> None:
+        """Draw a polyline in the axes of sight, where nothing hides it."""
+        steps = np.linalg.norm(np.diff(ends[:, :2], axis=0), axis=1) / (0.7 * self.pixel)
+        at = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1))])
+        spread = np.linspace(0, at[-1], math.ceil(at[-1]) + 1)
+        dots = np.stack([np.interp(spread, at, column) for column in ends.T], axis=1)
+        i, j = (self._at(k, dots[:, k]) for k in (1, 0))
+        seen = (i >= 0) & (i < len(self.y)) & (j >= 0) & (j < len(self.x))
+        i, j, z = i[seen], j[seen], dots[seen, 2]
+        nearer = z > self.depth[i, j]
+        self.colour[i[nearer], j[nearer]] = tint
 
     def ball(self, centre: Array, radius: float, tint: Array, axis: Array | None = None) -> None:
         """Draw a ball at a place in the axes of sight."""

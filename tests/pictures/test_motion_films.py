@@ -15,6 +15,10 @@ from polycorner.bodies import (
     Arrangement,
     Cylinder,
     HalfSpace,
+    Mass,
+    Robot,
+    RobotJoint,
+    RobotLink,
     box,
     capsule,
     disc,
@@ -259,3 +263,34 @@ def test_what_is_no_motion_is_refused():
         draw_motion(SphereCluster(3), path)
     with pytest.raises(ValueError, match="polyline: expected one of the coordinates xA, yA"):
         draw_motion(ROD, path)
+    for given, words in (
+        ({"motion": np.empty((0, 2))}, "motion: expected at least one point; got 'none'"),
+        ({"motion": path, "size": 10**6}, "size: expected a whole number >= 16 and <= 8192"),
+        ({"arrangement": pendulum(), "motion": path}, "motion: expected one of the coord.* pivot;"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            film(**{"arrangement": a, **given})
+
+
+def pendulum():
+    rod = RobotLink(capsule([0, 0, 0], [0, 0, -1], 0.1), Mass(1.0, [0, 0, -0.5], np.eye(3)))
+    joints = {"pivot": RobotJoint("stand", "rod", axis=[0, 1, 0])}
+    floor = {"floor": HalfSpace([0, 0, 1], [0, 0, -0.8])}
+    return Robot({"stand": RobotLink(), "rod": rod}, joints, walls=floor)
+
+
+def test_a_robot_is_shown_where_it_is_and_where_it_touches():
+    robot = pendulum()
+    system = robot.system(gravity=[0, 0, -10])
+    path = simulate(system, system.state([1.5]), 2.0, 0.01)
+    shown = film(robot, path).poses
+    assert shown.timed
+    np.testing.assert_array_equal(shown.times, path.times)
+    for k in (0, 60, -1):
+        angle = path.q[k, 0, 0]
+        end = np.array([-np.sin(angle), 0, -np.cos(angle)])
+        drawn = shown.placed(k % len(shown))["rod"].markers
+        np.testing.assert_allclose(drawn, [[0, 0, 0], end], atol=1e-9)
+    lowest = np.array([-np.sin(angle), 0, -0.8])
+    assert path.touching[-1][0][1] == "rod.v2-floor"
+    np.testing.assert_allclose(shown.marks(len(shown) - 1), [lowest], atol=1e-4)

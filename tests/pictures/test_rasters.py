@@ -6,7 +6,7 @@ from hulls import distance
 from scipy.spatial.transform import Rotation
 
 from polycorner.bodies import capsule, polytope, sphere
-from polycorner.pictures.rasters import FINE, Raster
+from polycorner.pictures.rasters import DARK, EDGE, FINE, Raster
 
 CORNERS = [[x, y, z] for x in (-1, 1) for y in (-0.7, 0.7) for z in (-0.5, 0.5)]
 SOLIDS = {
@@ -64,3 +64,20 @@ def test_lines_are_hidden_and_marks_are_not():
     assert abs(row[:, 20, 2] - row[:, 20, 0]).max() < 5
     raster.mark(np.array([-away]), 0.2, "red")
     assert raster.picture()[20, 20, 0] > raster.picture()[20, 20, 2] + 60
+
+
+def test_edges_of_sharp_parts_are_darker_than_their_faces():
+    """The middles of three edges between visible faces of a cube, and those of the faces."""
+    raster = Raster(200, np.array([[-1.0] * 3, [1.0] * 3]))
+    cube = polytope([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    raster.part(cube.parts[""], np.zeros(3), np.eye(3), "white")
+
+    def darkest(point):
+        x, y, _ = point @ raster.frame
+        i, j = np.argmin(abs(raster.y - y)), np.argmin(abs(raster.x - x))
+        return raster.colour[i - 1 : i + 2, j - 1 : j + 2].min()
+
+    corner = np.sign(raster.frame[:, 2]) / 2
+    for axis in np.eye(3):
+        assert darkest(corner * (1 - axis)) == pytest.approx(EDGE)
+        assert darkest(corner * axis) >= DARK > EDGE
