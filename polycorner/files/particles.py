@@ -41,12 +41,36 @@ class Particles(Checked):
         Unit quaternions ``w x y z``.
     radii : (N,) array, optional
         In the first frame.
+
+    Raises
+    ------
+    ValueError
+        For arrays of other shapes, numbers that are not finite, quaternions that are zero, and
+        radii that are not positive.
     """
 
     kinds: tuple[str, ...]
     positions: Array
     orientations: Array | None = None
     radii: Array | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        count = len(self.kinds)
+        frames = len(self.positions) if self.positions.ndim == 3 else 1
+        shapes = {
+            "positions": (frames, count, 3), "orientations": (frames, count, 4), "radii": (count,)
+        }  # fmt: skip
+        for name, shape in shapes.items():
+            given = getattr(self, name)
+            if given is not None and given.shape != shape:
+                refuse(name, f"shape {shape} for {count} kinds in {frames} frames", given.shape)
+            if given is not None and not np.isfinite(given).all():
+                refuse(name, "finite numbers", given)
+        if self.orientations is not None and not np.abs(self.orientations).max(axis=2).all():
+            refuse("orientations", "quaternions that are not zero", self.orientations)
+        if self.radii is not None and not (self.radii > 0).all():
+            refuse("radii", "numbers > 0", self.radii)
 
     def points(self, arrangement: Arrangement) -> Array:
         """Return the points ``(T, M)`` of an arrangement with the particles as its bodies.
@@ -138,6 +162,8 @@ def _xyz(about: str, data: bytes) -> Particles:
             frame.append([_number(place, words[columns["pos"] + k]) for k in range(3)])
             if "radius" in columns:
                 sizes.append(_number(place, words[columns["radius"]]))
+                if sizes[-1] <= 0:
+                    refuse(place, "a radius > 0", sizes[-1])
         if kinds and tuple(names) != kinds:
             refuse(f"{about}: line {start + 3}", "the particles of the first frame", names[:5])
         kinds, radii = tuple(names), radii or sizes
@@ -152,11 +178,14 @@ def _head(
     about: str, lines: list[str], start: int, known: int | None
 ) -> tuple[int, dict[str, int]]:
     """Return the count of a frame, and the first column of each property that is read."""
-    word, left = lines[start].strip(), len(lines) - start - 2
-    expected = "the number of particles" if known is None else f"the number of particles, {known}"
-    few = word.isascii() and word.isdecimal() and len(word) < len(str(left)) + 2
-    if not few or not 0 < int(word) <= left or known not in {None, int(word)}:
-        refuse(f"{about}: line {start + 1}", f"{expected}, at most {max(left, 0)}", word)
+    word, left = lines[start].strip(), max(len(lines) - start - 2, 0)
+    place = f"{about}: line {start + 1}"
+    if not (word.isascii() and word.isdecimal()) or not word.strip("0"):
+        refuse(place, "the number of particles", word)
+    if len(word) > len(str(left)) + 1 or int(word) > left:
+        refuse(place, f"at most {left} particles, for the lines after the comment", word)
+    if known not in {None, int(word)}:
+        refuse(place, f"{known} particles, as in the first frame", word)
     found = PROPERTIES.search(lines[start + 1])
     fields = (found.group(1) if found else PLAIN).split(":")
     columns: dict[str, int] = {}
@@ -231,17 +260,14 @@ def _frames(about: str, file: Any, megabytes: float) -> Particles:
 
     positions = every("position", 3)
     turned = None if chunk(0, "orientation") is None else every("orientation", 4)
-    if turned is not None and not (np.linalg.norm(turned, axis=2) > 0).all():
-        refuse(f"{about}: orientation", "quaternions that are not zero", "zeros")
     wide, types, numbers = (chunk(0, name) for name in ("diameter", "types", "typeid"))
     names = ["A"] if types is None else [_text(row) for row in np.atleast_2d(types)]
     ids = np.zeros(count, np.int64) if numbers is None else np.asarray(numbers, np.int64)
     if ids.shape != (count,) or ids.min() < 0 or ids.max() >= len(names):
         refuse(f"{about}: frame 0: typeid", f"{count} numbers of the types {names}", ids)
     radii = None if wide is None else np.asarray(wide, np.float64) / 2
-    if radii is not None and (radii.shape != (count,) or not (radii > 0).all()):
-        refuse(f"{about}: frame 0: diameter", f"{count} positive numbers", radii)
-    return Particles(tuple(names[k] for k in ids), positions, turned, radii)
+    with checks.about(about):
+        return Particles(tuple(names[k] for k in ids), positions, turned, radii)
 
 
 def _text(row: Any) -> str:

@@ -50,17 +50,23 @@ def test_columns_of_extended_xyz(written):
     [
         ("", "expected a number of particles"),
         ("x\n\n", "line 1: expected the number of particles"),
-        ("99999999999999\nc\nO 0 0 0\n", "line 1: expected the number of particles, at most 1"),
-        ("2\nc\nO 0 0 0\n", "line 1: expected the number of particles, at most 1"),
+        ("99999999999999\nc\nO 0 0 0\n", "line 1: expected at most 1 particles"),
+        (
+            "2\nc\nO 0 0 0\n",
+            "line 1: expected at most 1 particles, for the lines after the comment",
+        ),
+        ("0\nc\n", "line 1: expected the number of particles; got '0'"),
+        ("1\nc\nO 0 0 0\nO 0 0 1\n", "line 4: expected the number of particles; got 'O 0 0 1'"),
         ("-1\nc\nO 0 0 0\n", "line 1: expected the number"),
         ("1\nc\nO 0 0\n", "line 3: expected at least 4 words; got 'O 0 0'"),
         ("1\nc\nO 0 0 nan\n", "line 3: expected finite numbers; got 'nan'"),
         ("1\nc\nO 0 0 1_0\n", "line 3: expected finite numbers"),
-        (WATER + "1\nc\nO 0 0 0\n", "line 6: expected the number of particles, 3"),
+        (WATER + "1\nc\nO 0 0 0\n", "line 6: expected 3 particles, as in the first frame; got '1'"),
         (WATER + WATER.replace("O 0", "S 0"), "line 8: expected the particles of the first frame"),
         (EXTENDED.replace("pos:R:3", "pos:R:99"), "line 2: expected pos:R:3"),
         (EXTENDED.replace("pos:R:3", "pos:R:0"), "line 2: expected pos:R:3"),
         (EXTENDED.replace("pos:R:3", "place:R:3"), "line 2: expected species and pos"),
+        (EXTENDED.replace("0.25 B", "-0.25 B"), "line 4: expected a radius > 0; got -0.25"),
     ],
 )
 def test_what_is_wrong_in_xyz_is_said_with_its_line(written, text, words):
@@ -113,8 +119,8 @@ def test_frames_of_gsd(tmp_path):
 @pytest.mark.parametrize(
     ("chunks", "words"),
     [
-        ({"diameter": [1, 0, 1, 1]}, "frame 0: diameter: expected 4 positive numbers"),
-        ({"orientation": np.zeros((4, 4))}, "orientation: expected quaternions"),
+        ({"diameter": [1, 0, 1, 1]}, "radii: expected numbers > 0; got"),
+        ({"orientation": np.zeros((4, 4))}, "orientations: expected quaternions that are not zero"),
         ({"typeid": [0, 1, 2, 9]}, "frame 0: typeid: expected 4 numbers of the types"),
     ],
 )
@@ -187,5 +193,29 @@ def test_molecules_have_the_radii_of_tables(written):
 def test_columns_by_name_are_points_of_a_manifold():
     table = read_coordinates("t,y,x\n0,1.5,2\n1,2.5,3\n")
     assert table.points(Manifold.euclidean("x y")).tolist() == [[2, 1.5], [3, 2.5]]
-    with pytest.raises(ValueError, match=r"coordinates among \('y', 'x'\), once each; got 'z'"):
-        table.points(Manifold.euclidean("x z"))
+    for text, words in (
+        ("t,y,x\n0,1.5,2\n1,2.5,3\n", r"header has 'z' once, .*; got \['y', 'x'\]"),
+        ("x,z,z\n0.5,1.5,2\n", r"header has 'z' once"),
+        ("x,z\n0,1.5\n1,2.5\n", "header has 'x' once, read with index=False where a first col"),
+        ("x;z\n2,5;2,5\n", "header has a word for each of its 4 numbers in a line"),
+        ("0.5,1.5\n", r"header has a word for each of its 2 numbers in a line; got \[\]"),
+    ):
+        with pytest.raises(ValueError, match=f"^manifold: expected a table whose {words}"):
+            read_coordinates(text).points(Manifold.euclidean("x z"))
+    kept = read_coordinates("\ufeffx,z\n0,1.5\n1,2.5\n", index=False)
+    assert kept.points(Manifold.euclidean("x z")).tolist() == [[0, 1.5], [1, 2.5]]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"positions": np.zeros((1, 2, 3))}, r"positions: expected shape \(1, 1, 3\) for 1 kinds"),
+        ({"positions": np.zeros((1, 3))}, "positions: expected shape"),
+        ({"positions": np.full((1, 1, 3), np.nan)}, "positions: expected finite numbers"),
+        ({"orientations": np.zeros((1, 1, 4))}, "orientations: expected quaternions that are not"),
+        ({"radii": np.array([0.0])}, "radii: expected numbers > 0"),
+    ],
+)
+def test_arrays_that_are_no_particles_are_refused(given, words):
+    with pytest.raises(ValueError, match=f"^{words}"):
+        Particles(**{"kinds": ("H",), "positions": np.zeros((1, 1, 3)), **given})

@@ -1,5 +1,6 @@
 """Tables of coordinates as they are published: with white space or commas, headers, indices."""
 
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -67,7 +68,7 @@ class CoordinateTable(Checked, Described):
         Raises
         ------
         ValueError
-            For a coordinate without a column, or with two.
+            For a coordinate without a column, or with two, and columns without a name.
 
         Examples
         --------
@@ -75,9 +76,14 @@ class CoordinateTable(Checked, Described):
         >>> table.points(Manifold.euclidean("x y")).tolist()
         [[2.0, 0.5]]
         """
+        width, named = len(self.rows[0]), "a table whose header has"
+        if len(self.names) != width:
+            what = f"{named} a word for each of its {width} numbers in a line"
+            checks.refuse("manifold", what, [*self.names])
         for name in manifold.names:
             if self.names.count(name) != 1:
-                checks.refuse("manifold", f"coordinates among {self.names}, once each", name)
+                hint = "read with index=False where a first column counts"
+                checks.refuse("manifold", f"{named} {name!r} once, {hint}", [*self.names])
         columns = [self.names.index(name) for name in manifold.names]
         return np.asarray(manifold.points(self.floats[:, columns]))
 
@@ -128,7 +134,10 @@ def read_coordinates(
     """
     if columns is not None:
         checks.whole("columns", columns, least=1)
+    if table == "":
+        checks.refuse("table", "a file, or a text of several lines", table)
     text = table if isinstance(table, str) and "\n" in table else _content(table)
+    text = text.removeprefix("\ufeff")
     lines = list(_lines(text))
     names: tuple[str, ...] = ()
     if lines and not any(NUMBER.fullmatch(word) for word in lines[0][1]):
@@ -142,6 +151,8 @@ def read_coordinates(
         for word in words:
             if not NUMBER.fullmatch(word) or len(word) > LONGEST:
                 _wrong(number, "decimal numbers", word)
+            if not math.isfinite(float(re.sub("[dD]", "e", word))):
+                _wrong(number, "numbers in the range of doubles", word)
         if len(words) != width:
             _wrong(number, f"{width} numbers, as in line {lines[0][0]}", len(words))
     counted = _counted([words[0] for _, words in lines]) and width > 1

@@ -83,6 +83,7 @@ def test_columns_are_taken_out_with_their_names():
         ("0.5 1/3\n0.5 0.5\n", 1, "decimal numbers"),
         ("0.5,,0.5\n0.5 0.5\n", 1, "decimal numbers"),
         ("0.5 1e99999\n0.5 0.5\n", 1, "decimal numbers"),
+        ("0.5 1e400\n0.5 0.5\n", 1, "numbers in the range of doubles; got '1e400'"),
         ("0.5 " + "1" * 2000 + "\n0.5 0.5\n", 1, "decimal numbers"),
         ("3\n0.5 0.5\n0.5 0.5\n", 1, "the number of lines"),
     ],
@@ -90,6 +91,11 @@ def test_columns_are_taken_out_with_their_names():
 def test_damaged_lines_are_named(text, line, expected):
     with pytest.raises(ValueError, match=rf"^table: line {line}: expected .*{expected}"):
         read_coordinates(text)
+
+
+def test_an_empty_text_is_refused():
+    with pytest.raises(ValueError, match=r"^table: expected a file, or a text of several lines"):
+        read_coordinates("")
 
 
 @pytest.mark.parametrize("text", ["\n", "# nothing\n", "x y\n"])
