@@ -73,7 +73,7 @@ class MeshOptions(Checked):
     concavity : float
         How concave a part may be before it is cut, between 0.01 and 1 [CoACD].
     megabytes : float
-        The largest size of a file, in MiB.
+        The largest size of a file, in MiB; of a Collada file also that of all instances in it.
     """
 
     vertices: int = 64
@@ -134,7 +134,7 @@ def read_mesh(
         For what is not understood, and meshes that are not closed: these have no volume.  With
         ``parts="hull"`` an open mesh has the mass of its hull.
     ImportError
-        Naming the extra that cuts meshes.
+        Naming the extra that cuts meshes and reads Collada.
     OSError
         If the file cannot be read.
 

@@ -108,7 +108,8 @@ def read_urdf(
         convex parts (extra ``meshes``).  Two capsules have one gap, two hulls of many vertices
         thousands.
     sides : int, optional
-        The sides of prisms around cylinders; by default cylinders become capsules.
+        The sides of prisms around cylinders, at most half the ``vertices`` of ``options``; by
+        default cylinders become capsules.
     inertias : {"file", "nearest", "shapes"}, optional
         What becomes of inertias that no body has: they are refused (default), or changed to the
         nearest ones with second moments of at least a millimetre squared times the mass.  Or all
