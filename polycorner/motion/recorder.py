@@ -46,7 +46,7 @@ FLAGS = (
 TIES = {name for name in EngineState._fields if name.startswith("tie_")}
 LIMITS = {name for name in EngineState._fields if name.startswith("limit_")}
 # Not in states saved before there were these.
-NOW = {"rank", "body_of_rank", "stopped", *TIES, *LIMITS}
+NOW = {"rank", "body_of_rank", "stopped", "pile", *TIES, *LIMITS}
 WORK = {"substrate": SUBSTRATE_WORK, "applied": APPLIED_WORK, "noise": NOISE_WORK}
 
 
@@ -69,6 +69,7 @@ def check_state(engine: Engine, arrays: Mapping[str, Any], steps: int) -> None:
         "check_due": (0, last),
         "booked_to": (0, steps + 1),
         "stopped": (0, steps),
+        "pile": (0, N),
         "pair_flags": (0, 2 ** max(1, sizes.H) - 1),
         "cluster": (-1, -1),  # no body is within a step
         "counts": (0, last),
@@ -285,7 +286,8 @@ class Recorder:
         **run: Any,
     ) -> Trajectory:
         bodies, columns = self.engine.bodies, self.columns
-        touching = [[t for t in some if t[1] not in system.hidden] for some in self.touching]
+        hidden = system.hidden
+        touching = [[t for t in some if t[1] not in hidden] for some in self.touching]
         energies = np.array(columns["energies"])
         if any(kind.exit_coordinate >= 0 for kind in bodies.kinds):
             work["left"] = np.array(self.left)

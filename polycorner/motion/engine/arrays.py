@@ -222,7 +222,7 @@ class Model(NamedTuple):
     component_ties: Annotated[Any, whole("*")]
     component_tie: Annotated[Any, whole("*")]
     component_closed: Annotated[Any, whole("*")]  # whether equations may follow from others
-    component_rests: Annotated[Any, whole("*")]  # whether nothing in it depends on the time
+    still: Annotated[Any, whole("N")]  # whether nothing changes by itself for a body at rest
     apart_start: Annotated[Any, whole("N+1")]  # bodies with which each has no contact
     apart_from: Annotated[Any, whole("*")]
     limits: Annotated[Any, whole()]  # LU: on velocities, of all bodies, with their equations
@@ -249,6 +249,7 @@ class EngineState(NamedTuple):
     alive: Annotated[Any, whole("N", initial=1)]  # whether a body has not left
     rests: Annotated[Any, whole("N")]  # whether it has exactly the velocity of rest
     asleep: Annotated[Any, whole("N")]  # whether its rest is proved and it is not solved for
+    pile: Annotated[Any, whole("N")]  # 1 + first of the bodies with which it fell asleep, or 0
     booked_friction: Annotated[Any, real("F 2")]  # friction impulses when work was booked last
     booked_applied: Annotated[Any, real("N k")]  # impulses of applied forces then
     check_due: Annotated[Any, whole("N")]  # step in which a sleeper is checked again
@@ -372,6 +373,7 @@ class IslandWork(NamedTuple):
 
     joined: Annotated[Any, whole("N")]  # union-find forest of bodies that need shorter steps
     residual: Annotated[Any, real("N")]  # of the island that a body represents
+    proved: Annotated[Any, whole("N")]  # whether the velocity zero is known to solve its step
     stage: Annotated[Any, whole("N")]  # of the island that a body represents: SETTLED, ...
     curves_shut: Annotated[Any, whole("N")]  # whether its gaps would close by curvature
     sunk: Annotated[Any, whole("N")]  # of a crowd: block of a contact that is sunk in, or -1

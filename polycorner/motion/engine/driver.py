@@ -105,7 +105,8 @@ class Engine:
         self.bodies, self.dt, self.start, self.noise = bodies, float(dt), float(start), noise
         self.before = 0  # steps that were done before this run
         self.capacity = max(16, CONTACTS_PER_BODY * bodies.total)
-        self._own = _own_contacts(bodies)
+        self._own, self._pairs = _own_contacts(bodies), _pair_contacts(bodies)
+        self._first_tied = tied_events(bodies)
         self._check_size()
         self.model = model_of(bodies, self._sizes, noise, solver or Solver(), self.start, self.dt)
         self.motion = allocate(EngineState, self._sizes)
@@ -285,7 +286,7 @@ class Engine:
 
     def _read(self, count: int) -> EventTable:
         whole, numbers = self.log.entries[:count].copy(), self.log.numbers[:count].copy()
-        first = tied_events(self.bodies)
+        first = self._first_tied
         gaps = (whole[:, 3] >= 0) & (whole[:, 3] < first)
         of_pair, own = gaps & (whole[:, 2] >= 0), gaps & (whole[:, 2] < 0)
         whole[whole[:, 3] >= first, 3] -= first
@@ -307,11 +308,23 @@ class Engine:
         }
         stops = np.zeros(self.bodies.frictions, dtype=np.int64)  # of states saved before scatter
         arrays = {"rank": order, "body_of_rank": order, "stopped": stops, **untied, **arrays}
+        arrays |= self._sleepers(arrays)
         while self.capacity < len(arrays["keys"]):
             self.capacity *= 2
         self.bodies.check_places(arrays["q"], arrays["v"], self.dt)
         self.motion = restored(EngineState, self._sizes, arrays)
         self._allocate()
+
+    def _sleepers(self, arrays: Mapping[str, Any]) -> dict[str, Any]:
+        """Return who sleeps, and in which pile: none that the noise of this run moves.
+
+        States saved before there were piles have all bodies awake.
+        """
+        asleep = arrays["asleep"]
+        pile = arrays.get("pile", np.ones_like(asleep))
+        moved = np.isin(pile, pile[np.asarray(self.model.still) == 0]) & (pile > 0)
+        woken = moved if "pile" in arrays else np.ones_like(moved)
+        return {"asleep": np.where(woken, 0, asleep), "pile": np.where(woken, 0, pile)}
 
     def resume(self, arrays: Mapping[str, Any]) -> None:
         """Go on from the end of another run, with accounts of its own."""
@@ -389,12 +402,18 @@ class Engine:
         self, i: NDArray[np.int64], j: NDArray[np.int64], gaps: NDArray[np.int64]
     ) -> NDArray[np.int64]:
         """Return the numbers of contacts between bodies among the names of all."""
-        bodies, known = self.bodies, self.bodies.contact_names
-        table = np.zeros((self.model.families, self.model.most_pair_gaps), dtype=np.int64)
-        for row, family in zip(table, bodies.families.values(), strict=True):
-            row[: len(family.gaps.names)] = [known.index(name) for name in family.gaps.names]
-        families = self.model.family[bodies.kind_of[i], bodies.kind_of[j]]
-        return np.asarray(table[families, gaps])
+        kinds = self.bodies.kind_of
+        return np.asarray(self._pairs[self.model.family[kinds[i], kinds[j]], gaps])
+
+
+def _pair_contacts(bodies: MovingBodies) -> NDArray[np.int64]:
+    """Return for the gaps between bodies of each family the numbers of their names."""
+    numbers = {name: n for n, name in enumerate(bodies.contact_names)}
+    families = [family.gaps.names for family in bodies.families.values()]
+    table = np.zeros((len(families), max(map(len, families), default=0)), dtype=np.int64)
+    for row, names in zip(table, families, strict=True):
+        row[: len(names)] = [numbers[name] for name in names]
+    return table
 
 
 def _own_contacts(bodies: MovingBodies) -> NDArray[np.int64]:

@@ -118,7 +118,8 @@ def advance(model, state, work, log, steps):
     # Work on sleepers is booked when they are checked; what is left has to be before sums are read.
     index, h = state.counts[STEPS], model.step
     for i in range(model.bodies):
-        if state.alive[i] and state.asleep[i] and state.booked_to[i] < index:
+        books = state.asleep[i] and not state.pile[i] and state.booked_to[i] < index
+        if state.alive[i] and books:
             stays_asleep(model, state, mid, body, sleep, scratch, i, h, index * h, index)
     return DONE, steps, count
 

@@ -19,7 +19,7 @@ from polycorner.motion.engine.island_matrix import (
     solve_island_matrix,
 )
 from polycorner.motion.engine.jit import ONE, ZERO, compiled
-from polycorner.motion.engine.rest import REST_FACTOR
+from polycorner.motion.engine.rest import REST_FACTOR, SLEEP_MARGIN
 from polycorner.motion.engine.rows import add_row, copy_velocity, load_on, row_times, velocity_of
 from polycorner.motion.engine.sets import INTERVAL, barrier, contains
 from polycorner.motion.engine.signals import increase
@@ -354,7 +354,65 @@ def interior_point_steps(model, state, work, first, last, n, speed, goal):
 
 
 @compiled
-def find_equilibrium(model, state, work, first, last, speed):
+def leaves_reserve(model, block, b):
+    """Return whether friction that carries leaves a share of its set unused."""
+    load, p = load_on(block, b), block.impulse
+    return load <= 0.0 or contains(model, block.set[b], p[b, 0], p[b, 1], load, -SLEEP_MARGIN)
+
+
+@compiled
+def all_leave_reserves(model, block, first, last):
+    """Return whether all friction of an island leaves a share of its sets unused."""
+    for s in range(first, last):
+        b = block.order[s]
+        if block.rows[b] > 0 and not leaves_reserve(model, block, b):
+            return False
+    return True
+
+
+@compiled
+def resists(model, work, first, last, n):
+    """Return whether contacts that carry resist the whole motion of an island.
+
+    A motion ``v`` that none of their rows sees, such as that of a box on ice, would go on for ever:
+    rest must not swallow it.  With ``A`` the sum of the squares of all rows, each over its entry of
+    the Delassus matrix, and ``e`` small, ``v' M (A + e M)^-1 M v`` is at least the energy of such a
+    part over ``e``, and otherwise that of ``v`` over the least eigenvalue of ``A``.
+    """
+    block, search, matrix, velocity = work.block, work.search, work.matrix, work.velocity
+    k, K, mid, G = model.dimension, model.lanes, work.mid, work.search.derivative
+    assemble_mass(model, mid, matrix, n, REGULARISATION)
+    for s in range(first, last):
+        b = block.order[s]
+        loaded = block.bilateral[b] or block.impulse[b, 0] > 0.0
+        if block.rows[b] > 0:
+            loaded = load_on(block, b) > 0.0
+        if not (loaded and search.carries[b] > 0.0):
+            continue
+        for a in range(9):
+            G[b, a] = 0.0
+        G[b, 4] = G[b, 8] = block.delassus[b, 3]
+        add_block(model, block, search, matrix, n, b)
+    energy, response = 0.0, 0.0
+    for again in range(2):
+        for at in range(n):
+            i = matrix.members[at]
+            for c in range(K):
+                value = 0.0
+                for a in range(k if c < k else 0):
+                    value += mid.mass[i, c, a] * velocity.new[i, a]
+                if again:
+                    response += value * matrix.vector[at * K + c]
+                else:
+                    energy += value * velocity.new[i, c]
+                    matrix.vector[at * K + c] = value
+        if not again and not solve_island_matrix(model, matrix, n):
+            return False
+    return response * np.sqrt(REGULARISATION) <= energy
+
+
+@compiled
+def find_equilibrium(model, state, work, first, last, speed, stops):
     """Return whether an island can be at rest after the step; then its impulses are the proof.
 
     The velocities of rest are in ``velocity.rest``.  At rest nothing slips, so that De Saxce's term
@@ -364,7 +422,7 @@ def find_equilibrium(model, state, work, first, last, speed):
     the first sum excludes forces that grow without bound in a jam; an equation has
     ``(n / n_0)^2 / 2`` instead, and its ``n`` keeps its sign where friction depends on it).
     Impulses far from the boundary can still balance when the loads change a little, so that the
-    pile can sleep.
+    pile can sleep.  What moves ``stops`` only if friction has a reserve and nothing moves freely.
     """
     velocity, block, search = work.velocity, work.block, work.search
     matrix, scratch = work.matrix, work.scratch
@@ -376,8 +434,13 @@ def find_equilibrium(model, state, work, first, last, speed):
     proved = False
     if contacts_remain(model, velocity, block, search, scratch, first, last, goal):
         proved = still_balance(model, work, first, last, n, goal)
+        # They may have used up friction that others leave in reserve.
+        proved = proved and (stops == 0 or all_leave_reserves(model, block, first, last))
         if not proved and find_interior_start(model, block, search, scratch, first, last, speed):
             proved = interior_point_steps(model, state, work, first, last, n, speed, goal)
+    if proved and stops != 0:
+        proved = all_leave_reserves(model, block, first, last)
+        proved = proved and resists(model, work, first, last, n)
     if not proved:
         copy_impulses(block, first, last, search.initial, block.impulse)
         return False

@@ -37,10 +37,12 @@ from polycorner.motion.engine.impacts import (
     strike_alone,
 )
 from polycorner.motion.engine.island_matrix import number_bodies
-from polycorner.motion.engine.jit import NONE, ONE, compiled
+from polycorner.motion.engine.island_sleep import stops
+from polycorner.motion.engine.jit import NONE, ONE, ZERO, compiled
 from polycorner.motion.engine.limits import ROUNDING
 from polycorner.motion.engine.linear_algebra import add_square, solve_spd
 from polycorner.motion.engine.newton import newton_steps
+from polycorner.motion.engine.partition import island_of
 from polycorner.motion.engine.rest import find_rest_velocity, keeps_contacts, keeps_limits
 from polycorner.motion.engine.rows import copy_velocity, load_on, sticks, velocity_of
 from polycorner.motion.engine.signals import increase
@@ -267,9 +269,13 @@ def solve_island(model, state, work, first, last, again):
     """Solve the blocks ``order[first:last]``; return the residual relative to the speeds.
 
     For an island at rest, first a feasibility problem is solved; see :func:`find_equilibrium`.
+    What is not, but all but stands still, may be stopped; see
+    :mod:`~polycorner.motion.engine.island_sleep`.
     """
     velocity, block, search, scratch = work.velocity, work.block, work.search, work.scratch
     speed, at_rest = begin_island(state, work.body, block, search, first, last)
+    proved, root = work.island.proved, island_of(work.body, work.island, block, block.order[first])
+    proved[root] = 0
     if speed == 0.0:  # no motion and no force
         for s in range(first, last):
             for r in range(2):
@@ -281,12 +287,16 @@ def solve_island(model, state, work, first, last, again):
                     copy_velocity(model, velocity.free, velocity.new, i)
         return 0.0
     if at_rest and rests(model, state, work, first, last, speed):
+        proved[root] = 1 if stops(model, state, work, first, last) else 0
         return residual(model, velocity, block, search, scratch, first, last, 0.0) / speed
     bounces = model.impact != PLASTIC and has_bounces(block, first, last)
     if bounces and model.impact in (POISSON, STRONGE):
         compress(block, first, last)
     worst = solve_slipping(model, state, work, first, last, speed, again, not at_rest)
     solved = worst <= model.tolerance * speed
+    if solved and not (at_rest or bounces) and stops(model, state, work, first, last):
+        proved[root] = 1
+        return residual(model, velocity, block, search, scratch, first, last, 0.0) / speed
     if keeps_grip(model, state, work, first, last, speed, solved):
         worst = residual(model, velocity, block, search, scratch, first, last, 0.0)
     if model.impact in (POISSON, STRONGE):
@@ -381,7 +391,7 @@ def rests(model, state, work, first, last, speed):
     copy_impulses(block, first, last, block.target, work.search.rigid)
     for s in range(first, last):
         block.target[block.order[s], 0] = block.target[block.order[s], 1] = 0.0
-    if find_equilibrium(model, state, work, first, last, speed):
+    if find_equilibrium(model, state, work, first, last, speed, ZERO):
         return True
     copy_impulses(block, first, last, work.search.rigid, block.target)
     return False
@@ -402,7 +412,7 @@ def keeps_grip(model, state, work, first, last, speed, solved):
     ):
         return False
     copy_impulses(block, first, last, block.offset, search.rigid)
-    if find_equilibrium(model, state, work, first, last, speed):
+    if find_equilibrium(model, state, work, first, last, speed, ZERO):
         return True
     # It moves bounds to where rest would have them; the solution at hand is of those before.
     copy_impulses(block, first, last, search.rigid, block.offset)

@@ -445,6 +445,13 @@ def _components(bodies: MovingBodies, noise: Noise) -> dict[str, Any]:
         and not (kind.body.limits and kind.body.limits.timed)
         for kind in bodies.kinds
     ]
+    rests = [
+        still[a] and not (bodies.kinds[a].body.limits or bodies.attracts) for a in bodies.kind_of
+    ]
+    for c in found:
+        held = all(still[bodies.kind_of[i]] for i in c.bodies)
+        for i in c.bodies:
+            rests[i] = held and not any(ties.forms[ties.form[t]].timed for t in c.ties)
     return {
         "tie_start": np.cumsum([0, *map(len, sides)]),
         "tie_sides": [code for some in sides for code in some],
@@ -454,11 +461,7 @@ def _components(bodies: MovingBodies, noise: Noise) -> dict[str, Any]:
         "component_ties": np.cumsum([0, *(len(c.ties) for c in found)]),
         "component_tie": [t for c in found for t in c.ties],
         "component_closed": [c.closed for c in found],
-        "component_rests": [
-            all(still[bodies.kind_of[i]] for i in c.bodies)
-            and not any(ties.forms[ties.form[t]].timed for t in c.ties)
-            for c in found
-        ],
+        "still": rests,
         "apart_start": np.cumsum([0, *map(len, away)]),
         "apart_from": [j for some in away for j in sorted(some)],
     }

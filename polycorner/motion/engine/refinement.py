@@ -28,6 +28,7 @@ from polycorner.motion.engine.contact_list import FAILED, place_of, record
 from polycorner.motion.engine.crowds import is_crowd
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.gauss_seidel import residual
+from polycorner.motion.engine.island_sleep import disperse
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.left_out import find_passing, leave_out, slow_travel
 from polycorner.motion.engine.limit_blocks import acceptable_to_limits
@@ -93,6 +94,7 @@ def gather(model, state, work, root, time, index):
         if inside and state.asleep[i]:
             # It stays what it is here; what counts is that its work is booked.
             stays_asleep(model, state, mid, body, sleep, scratch, i, model.step, time, index)
+            disperse(model, state, i)
             state.asleep[i] = 0
         body.awake[i] = 1 if inside else 0
         # Others wait where they are at the beginning of the step.

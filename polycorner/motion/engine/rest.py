@@ -231,7 +231,7 @@ def comes_to_rest(model, state, work, i, rest):
     if (
         still
         and not work.manner.located[0]
-        and not is_tied(model, i)  # see `tied_sleep`
+        and not is_tied(model, i)  # see `island_sleep`
         and model.first_limit[i] == model.first_limit[i + 1]  # which are no part of the proof
         and remains_at_rest(model, state, mid, sleep, scratch, i, others)
     ):

@@ -11,6 +11,7 @@ from polycorner.motion.engine.arrays import (
 )
 from polycorner.motion.engine.evaluation import evaluate_body
 from polycorner.motion.engine.families import kind_of
+from polycorner.motion.engine.island_sleep import PRESSED, presses, settle_islands, wake_mates
 from polycorner.motion.engine.jit import compiled
 from polycorner.motion.engine.neighbours import bodies_of
 from polycorner.motion.engine.partition import island_of, root_of
@@ -23,8 +24,6 @@ from polycorner.motion.engine.rest import (
     remains_at_rest,
 )
 from polycorner.motion.engine.sets import contains
-from polycorner.motion.engine.tied_sleep import PRESSED, presses, settle_tied, wake_tied
-from polycorner.motion.engine.ties import is_tied
 
 LONGEST_SLEEP = np.int64(50)  # most steps between two checks of a sleeper
 
@@ -45,7 +44,7 @@ def wake(model, state, work, h, time, index):
         if not state.alive[i]:
             continue
         # Its midpoint is needed by neighbours that are awake.
-        if state.asleep[i] and (state.check_due[i] > index or is_tied(model, i)):
+        if state.asleep[i] and (state.check_due[i] > index or state.pile[i] > 0):
             for c in range(model.dimension):
                 mid.q[i, c] = state.q[i, c] + 0.5 * h * state.v[i, c]
             continue
@@ -55,8 +54,8 @@ def wake(model, state, work, h, time, index):
             body.awake[i], any_awake = 1, True
     if any_awake and model.families > 0:
         wake_piles(model, state, work, h, time, index)
-        if model.ties > 0:
-            wake_tied(model, state, work, h, time, index)
+    if any_awake:
+        wake_mates(model, state, work, h, time, index)
     return any_awake
 
 
@@ -100,7 +99,7 @@ def stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index):
     # It was woken in this step already; only its evaluation was wanted.
     if not state.asleep[i]:
         return False
-    if is_tied(model, i):  # without velocity, and so without work
+    if state.pile[i]:  # without velocity, and so without work
         state.booked_to[i] = index
         return True
     asleep = remains_at_rest(model, state, mid, sleep, scratch, i, state.neighbour_impulse)
@@ -178,7 +177,8 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
     for s in range(state.counts[CONTACTS]):
         i, j = bodies_of(model, state, s)
         if body.awake[i] or body.awake[j]:
-            seen = 1 | PRESSED if model.ties > 0 and presses(model, state, s) else 1
+            piled = state.pile[i] > 0 or state.pile[j] > 0
+            seen = 1 | PRESSED if piled and presses(model, state, s) else 1
             sleep.disturbed[i] |= seen
             sleep.disturbed[j] |= seen
             continue
@@ -198,13 +198,13 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
                     # Most contacts of a heap are open.
                     if p == 0.0:
                         continue
-                    sleep.disturbed[i] |= PRESSED if model.ties > 0 else 0
+                    sleep.disturbed[i] |= PRESSED
                     for c in range(k):
                         slope = block.jacobian[b, r, side * model.lanes + c]
                         sleep.neighbour_impulse[i, c] += slope * p
     woken = False
     for i in range(N):
-        if is_tied(model, i):
+        if state.pile[i]:
             if sleep.disturbed[i] > 1 and not (body.awake[i] or body.waits[i]):
                 body.awake[i], woken = 1, True
         elif sleep.disturbed[i] and state.alive[i] and not (body.awake[i] or body.waits[i]):
@@ -215,8 +215,8 @@ def wake_neighbours(model, state, work, blocks, h, time, index):
             ):
                 body.awake[i] = 1
                 woken = True
-    if woken and model.ties > 0:
-        wake_tied(model, state, work, h, time, index)
+    if woken:
+        wake_mates(model, state, work, h, time, index)
     return woken
 
 
@@ -230,7 +230,7 @@ def settle(model, state, work, h, index):
         if not state.alive[i]:
             continue
         if body.awake[i]:
-            state.rests[i], state.asleep[i] = 0, 0
+            state.rests[i] = state.asleep[i] = state.pile[i] = 0
             if model.may_rest and comes_to_rest(model, state, work, i, rest):
                 state.rests[i] = 1
         if body.awake[i] or sleep.disturbed[i]:
@@ -239,7 +239,7 @@ def settle(model, state, work, h, index):
         if body.awake[i]:
             state.booked_to[i], state.check_due[i] = index + 1, index + 1
         # What proves rest becomes the state, from which the next proof starts.
-        if state.asleep[i] and body.evaluated[i] and not is_tied(model, i):
+        if state.asleep[i] and body.evaluated[i] and not state.pile[i]:
             if not body.awake[i]:
                 state.booked_to[i] = index + 1
                 state.check_due[i] = next_check(model, state, mid, sleep, i, h, index)
@@ -254,5 +254,5 @@ def settle(model, state, work, h, index):
                 release = release_time(before, now, state.release[g], h, index * h)
                 state.normal[g], state.pressed[g] = now, now
                 state.release[g] = release
-    if model.ties > 0 and not work.manner.located[0]:
-        settle_tied(model, state, work)
+    if model.may_rest and not work.manner.located[0]:
+        settle_islands(model, state, work)

@@ -39,7 +39,6 @@ from polycorner.motion.engine.rows import apply_impulses
 from polycorner.motion.engine.signals import increase
 from polycorner.motion.engine.sizes import AT_ONCE
 from polycorner.motion.engine.tie_blocks import assemble_ties, evaluate_ties, predict_ties
-from polycorner.motion.engine.tied_sleep import wake_together
 
 MOST_CORRECTIONS = 8  # solutions of a step, at most, for the curvature of equations
 
@@ -49,8 +48,6 @@ def evaluate_bodies(model, state, work, h, time, index):
     """Evaluate all bodies that are not asleep."""
     shared = work.shared
     shared.times[codes.TIME], shared.told[codes.STEP_INDEX] = time, index
-    if model.ties > 0:
-        wake_together(model, state)
     share_range(model, state, work, codes.EVALUATE, model.bodies, h)
     if model.ties > 0:
         evaluate_ties(model, state, work, h, time)

@@ -37,6 +37,7 @@ from polycorner.motion.engine.crowds import is_crowd, renew_ranks
 from polycorner.motion.engine.curvature import follow_curvature
 from polycorner.motion.engine.evaluation import update_forces
 from polycorner.motion.engine.families import kind_of
+from polycorner.motion.engine.island_sleep import disperse
 from polycorner.motion.engine.jit import NONE, ZERO, compiled
 from polycorner.motion.engine.limit_blocks import begin_limits, follow_limits
 from polycorner.motion.engine.neighbour_list import list_neighbours, outdated
@@ -103,7 +104,7 @@ def solve(model, state, work, h, time, index, solved):
 def unsettle(model, island):
     """Let all islands be solved."""
     for i in range(model.bodies):
-        island.stage[i] = SOLVED
+        island.stage[i], island.proved[i] = SOLVED, 0
 
 
 @compiled
@@ -215,5 +216,7 @@ def commit(model, state, work, log, blocks, h, time, index, any_awake, count):
                 if i in (one, two):
                     # What it held up has to be asked at once whether it still rests.
                     state.check_due[one] = state.check_due[two] = 0
-                    state.asleep[one] = state.asleep[two] = 0
+                    for other in (one, two):
+                        disperse(model, state, other)
+                        state.asleep[other] = 0
     return count
