@@ -279,19 +279,19 @@ class MovingBodies(Value):
         """Names of the kinds; empty if bodies have numbers only."""
         return ()
 
-    @property
-    def starts(self) -> list[int]:
+    @cached_property
+    def starts(self) -> tuple[int, ...]:
         """The number of the first body of each kind, and of all bodies."""
-        return [0, *np.cumsum([kind.count for kind in self.kinds]).tolist()]
+        return (0, *np.cumsum([kind.count for kind in self.kinds]).tolist())
 
-    @property
-    def slices(self) -> "list[tuple[IdenticalBodies, slice]]":
+    @cached_property
+    def slices(self) -> "tuple[tuple[IdenticalBodies, slice], ...]":
         """Each kind, and where its bodies are among all."""
-        return [
+        return tuple(
             (kind, slice(*at)) for kind, at in zip(self.kinds, pairwise(self.starts), strict=True)
-        ]
+        )
 
-    @property
+    @cached_property
     def total(self) -> int:
         """The number of bodies."""
         return self.starts[-1]

@@ -1,6 +1,7 @@
 """Allocation of the records of the engine, with arrays that begin with a cache line."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from math import prod
 from typing import Any, TypeVar, get_type_hints
 
@@ -22,14 +23,20 @@ LINE = 8  # numbers in a cache line, into which whole vectors fit
 Record = TypeVar("Record", Model, EngineState, Log)
 
 
+@lru_cache(maxsize=64)  # of two runs: reading the shapes takes as long as a hundred steps
+def extents_of(record: type[Any], sizes: Sizes) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the arrays of a record."""
+    return {name: declared.extents(sizes) for name, declared in declarations(record).items()}
+
+
 def size_of(sizes: Sizes) -> float:
     """Return how many bytes state, workspace and log take, but for the matrix of an island.
 
     Of that memory is used as islands grow.
     """
     records = [EngineState, Log, *get_type_hints(Work).values()]
-    arrays = [declared for record in records for declared in declarations(record).values()]
-    whole = sum(float(prod(declared.extents(sizes))) for declared in arrays)
+    arrays = [extents for record in records for extents in extents_of(record, sizes).values()]
+    whole = sum(float(prod(extents)) for extents in arrays)
     return 8.0 * (whole - sizes.M)
 
 
@@ -46,14 +53,18 @@ def own_workspace(work: Work, sizes: Sizes) -> Work:
 
 def allocate(record: type[Record], sizes: Sizes) -> Record:
     """Return new arrays with their initial values."""
+    named: Any = record  # to mypy classes of named tuples cannot be hashed
+    extents = extents_of(named, sizes)
     return record(
-        **{name: initial_array(declared, sizes) for name, declared in declarations(record).items()}
+        **{
+            name: initial_array(declared, extents[name])
+            for name, declared in declarations(record).items()
+        }
     )
 
 
-def initial_array(declared: Declaration, sizes: Sizes) -> Any:
+def initial_array(declared: Declaration, extents: tuple[int, ...]) -> Any:
     """Return a new array with its initial values; of zeros, memory is used as it is written."""
-    extents = declared.extents(sizes)
     count = prod(extents)
     room = np.zeros(count + LINE, dtype=declared.kind)
     first = -room.ctypes.data // room.itemsize % LINE
