@@ -26,6 +26,7 @@ from polycorner.motion.engine.rest import (
 from polycorner.motion.engine.sets import contains
 
 LONGEST_SLEEP = np.int64(50)  # most steps between two checks of a sleeper
+NEVER = np.int64(2**40)  # steps until a check that is not needed
 
 
 @compiled
@@ -128,7 +129,11 @@ def stays_asleep(model, state, mid, body, sleep, scratch, i, h, time, index):
 @compiled
 def next_check(model, state, mid, sleep, i, h, index):
     """Return the step in which a sleeper is checked again."""
-    rate = 0.0
+    rate, still = 0.0, model.still[i] != 0
+    for c in range(model.dimension):
+        still = still and state.v[i, c] == 0.0
+    if still:  # its step is the same for ever, until a body that is awake touches it
+        return index + NEVER
     for f in range(model.first_friction[i], model.first_friction[i + 1]):
         load = load_of(model, mid, sleep.proof_normal, i, f)
         if load <= 0.0:

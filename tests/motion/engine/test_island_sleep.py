@@ -137,6 +137,25 @@ def test_trajectories_with_and_without_sleep_agree_to_the_accuracy_of_the_solver
     assert abs(sleeps - wakes).max() < system.solver.tolerance * G * DT * len(piles) * DT
 
 
+def test_sleepers_that_are_checked_in_every_step_sleep_as_those_that_are_not():
+    """Boxes fall on sleeping ones, and off them; impulses at rest may differ in the last bits."""
+    rng = np.random.default_rng(1)
+    a, system = boxes(2, 6)
+    places = [(1.3 * (k % 2), 0.8 + 1.5 * (k // 2)) for k in range(6)]
+    turns = rng.uniform(-0.3, 0.3, 6)
+    q = np.array([a.point({"A": x}) for x in zip(places, turns, strict=True)])
+    checked, trusted = (start(system, system.state(q), DT) for _ in range(2))
+    slept = 0
+    for _ in range(700):
+        checked.motion.check_due[:] = 0
+        checked.advance(1)
+        trusted.advance(1)
+        slept += (trusted.motion.asleep > (trusted.motion.pile > 0)).any()
+        far = abs(checked.motion.q - trusted.motion.q).max()
+        assert far <= system.solver.tolerance * G * DT * trusted.time
+    assert slept > 100
+
+
 @pytest.mark.parametrize(("tangent", "moves"), [(0.9 * MU, False), (1.1 * MU, True)])
 def test_a_tower_slides_on_a_slope_beyond_the_angle_of_friction(tangent, moves):
     a, system = boxes(2, 3, math.atan(tangent))
