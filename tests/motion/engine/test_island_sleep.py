@@ -269,6 +269,22 @@ def test_what_hits_a_pile_wakes_all_of_it():
     assert asleep(engine)
 
 
+def test_a_pile_that_was_saved_asleep_is_hit_in_the_same_way():
+    a, system = boxes(2, 4)
+    q = standing(a, [(0, 0.5), (0, 1.5), (0, 2.5), (-3, 2.5)])
+    v = np.zeros((4, 3))
+    v[3] = 6, 2, 0
+    whole, again = (start(system, system.state(q, v), DT) for _ in range(2))
+    whole.advance(100)
+    again.load({name: array.copy() for name, array in whole.save().items()})
+    assert again.motion.asleep[:3].all()
+    for engine in (whole, again):
+        engine.advance(200)
+    assert not whole.motion.asleep[:3].all()
+    assert np.array_equal(whole.motion.q, again.motion.q)
+    assert np.array_equal(whole.motion.v, again.motion.v)
+
+
 def test_a_pile_wakes_with_what_it_lies_on():
     """A support that is woken and moved leaves what lay on it without support."""
     a, system = boxes(2, 3)
