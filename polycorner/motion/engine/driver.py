@@ -330,7 +330,10 @@ class Engine:
         """Go on from the end of another run, with accounts of its own."""
         kept = np.zeros_like(arrays["counts"])
         kept[[CONTACTS, STEPS]] = arrays["counts"][[CONTACTS, STEPS]]
-        self.load({**arrays, "counts": kept, "sums": np.zeros_like(arrays["sums"])})
+        # What the noise of this run moves may have been left alone until some later step.
+        due = np.where(np.asarray(self.model.still) == 0, 0, arrays["check_due"])
+        fresh = {"counts": kept, "sums": np.zeros_like(arrays["sums"]), "check_due": due}
+        self.load({**arrays, **fresh})
         self.before = int(kept[STEPS])
 
     def energies(self) -> tuple[float, float]:

@@ -254,6 +254,16 @@ def test_noise_wakes_a_pile_that_goes_on_with_it():
     assert abs(kicked.motion.q - path.last.q).max() > 1e-3
 
 
+def test_noise_moves_a_single_sleeper_from_the_first_step_with_it():
+    """Alone, it is checked again when something touches it, which may be never."""
+    a, system = boxes(2, 1)
+    path = simulate(system, system.state(standing(a, [(0, 0.5)])), 0.2, DT)
+    kicked = start(path.system, path.last, DT, noise=Noise(kicks={"xA": 5.0}, seed=1))
+    assert kicked.motion.asleep.all()
+    kicked.advance(2)
+    assert abs(kicked.motion.v).max() > 0
+
+
 def test_what_hits_a_pile_wakes_all_of_it():
     """A box that flies against the upper of two pushes it off; the lower one goes along."""
     a, system = boxes(2, 4)
