@@ -1,7 +1,7 @@
 """Mechanisms: bodies with joints, as formulas, and their placements by angles and positions."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,9 @@ from polycorner.bodies.poses import Placement, pose_of
 from polycorner.bodies.shapes import Body
 from polycorner.checks import about, refuse
 from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.placements import onto_equations
+from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
@@ -171,6 +173,12 @@ class Mechanism(Checked):
             for joint in self.joints.values()
             if isinstance(joint, Joint) and not joint.collide
         )
+
+
+def joined(mechanism: Mechanism, manifold: Manifold, parts: Iterable[Any]) -> Polyhedron:
+    """Return placements in which joints hold, with given and/or trees of gaps."""
+    limits = [SmoothFunction(*one, manifold) for one in mechanism.limits.items()]
+    return Polyhedron(manifold, AllOf(*parts, *limits), mechanism.equations)
 
 
 def completed(

@@ -38,7 +38,7 @@ def assembly(
         Each kind, and the arrangement of one such body.
     count : mapping from str to int
     laws : mapping from str to coefficients
-        ``friction``, ``rolling`` and ``restitution``.
+        ``friction``, ``rolling``, ``restitution`` and ``attraction``.
     some : mapping from str to mapping
         Further arguments that have values for some of the kinds: ``masses`` and ``forces`` by
         their names, ``exits`` by coordinate, and ``drives``, some of which tie bodies.
