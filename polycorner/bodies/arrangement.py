@@ -28,7 +28,7 @@ from polycorner.bodies.mechanisms import (
     joined,
     moved_along,
 )
-from polycorner.bodies.neighbours import Pair, check_room, pairs
+from polycorner.bodies.neighbours import Pair, check_room, check_width, pairs
 from polycorner.bodies.pairs import Tree, apart, both_sharp, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
 from polycorner.bodies.shapes import Body
@@ -89,7 +89,7 @@ class Arrangement(Checked, Printed):
         Equations ``<name>.x``, ... of the placements, and the inequalities ``<name>.min`` and
         ``<name>.max`` of limits.  Bodies that a joint connects do not touch each other, unless it
         says ``collide=True``.  They have all coordinates of an orientation, unless joints hold
-        them on their axis alone.
+        them on their axis alone.  In a periodic box they join nearest images.
 
     Raises
     ------
@@ -145,8 +145,8 @@ class Arrangement(Checked, Printed):
         check_joints(self.joints, self.named, self.fixed)
         if self.joints and self.orientations == "none":
             refuse("orientations", "'needed' or 'all' where there are joints", "none")
-        if self.joints and self.lattice.axes:
-            refuse("period", "none where there are joints", self.period)
+        if self.joints:
+            check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
         if self.period is not None:
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
         check_room(self.lattice, self.placements, self.walls)
@@ -236,7 +236,7 @@ class Arrangement(Checked, Printed):
     @cached_property
     def mechanism(self) -> Mechanism:
         """The formulas of joints."""
-        return Mechanism(self.joints, self.placements)
+        return Mechanism(self.joints, self.placements, periods=tuple(self.lattice.lengths.tolist()))
 
     def contacts(self, *, excluded: bool, sharp: bool = True) -> list[Tree]:
         """Return the and/or trees of pairs of parts, of ``sharp`` ones too, and the gaps at walls.

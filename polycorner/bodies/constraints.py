@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from polycorner import checks
 from polycorner.bodies.holds import Angle, Coordinate, Holding, Position, across, hamilton, times
+from polycorner.bodies.images import wrapped
 from polycorner.bodies.joints import AnyJoint, Ball, Fixed, Gear, Hinge, Joint, Planar, Rail, Slider
 from polycorner.bodies.shapes import Body, turning
 from polycorner.checks import about, refuse
@@ -96,8 +97,16 @@ def _axis(joint: Joint) -> Array:
 
 def away(joint: Joint, one: Holding, two: Holding) -> "Point":
     """Return the way ``w`` from the parent's anchor to the child's, in the axes of space."""
-    at, on = anchors(joint, two.dimension)
-    x, y, z = (q - p for p, q in zip(one.point(at), two.point(on), strict=True))
+    return way(one, two, *anchors(joint, two.dimension))
+
+
+def way(one: Holding, two: Holding, here: Array, there: Array) -> "Point":
+    """Return the way from a point of a body to the nearest image of one of another, in space."""
+    ends, periods = (one.point(here), two.point(there)), (*one.periods, *[math.inf] * 3)
+    x, y, z = (
+        wrapped(math.tau * (q - p) / period, period) if math.isfinite(period) else q - p
+        for p, q, period in zip(*ends, periods, strict=False)
+    )
     return x, y, z
 
 

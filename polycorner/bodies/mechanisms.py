@@ -68,17 +68,24 @@ class Mechanism(Checked):
     ----------
     joints : mapping from str to Joint or Gear
     placements : tuple of Placement
+    unwound : bool, optional
+        Whether angles of bodies in the plane count turns, as along a motion, so that no coordinate
+        has to; default not: they are points of circles.
+    periods : tuple of float, optional
+        Of a box whose images are joined, ``inf`` in directions without.
     """
 
     joints: Mapping[str, AnyJoint]
     placements: tuple[Placement, ...]
+    unwound: bool = False
+    periods: tuple[float, ...] = ()
 
     def hold(self, name: str) -> Holding:
         """Return what joints take hold of by a name; that of no body that moves is space."""
         d = self.placements[0].body.dimension
         found = (p for p in self.placements if p.name == name)
-        bodies = (Holding(name, p.frame, d, p.body.axis) for p in found)
-        return next(bodies, Holding(name, Frame.FIXED, d, None))
+        bodies = (Holding(name, p.frame, d, p.body.axis, self.periods) for p in found)
+        return next(bodies, Holding(name, Frame.FIXED, d, None, self.periods))
 
     def sides(self, joint: Joint) -> tuple[Holding, Holding]:
         """Return what a joint takes hold of."""
@@ -93,12 +100,18 @@ class Mechanism(Checked):
             refuse(argument, able, name)
         if name in self.counters:
             return Position(*symbols([self.counters[name]]))
+        if counts_turns(joint):
+            plain = self.angle(name).plain
+            assert plain is not None, name
+            return Position(plain)
         return constraints.coordinate(joint, *self.sides(joint))
 
     @property
     def counters(self) -> dict[str, str]:
         """The coordinates that count the turns of hinges, by the names of these."""
-        counted = [name for name, joint in self.joints.items() if counts_turns(joint)]
+        counted = [
+            n for n, joint in self.joints.items() if counts_turns(joint) and not self.unwound
+        ]
         return {name: f"turned{k}" for k, name in enumerate(counted, 1)}
 
     def angle(self, name: str) -> Angle:

@@ -141,8 +141,6 @@ def _further(a: Any, joints: Any) -> dict[str, AnyJoint]:
     """Return joints of repeated bodies, after checking their names."""
     found = {} if joints is None else dict(checks.mapping("joints", joints))
     check_together(a.named, a.fixed, a.walls, [*a.joints, *found])
-    if found and a.lattice.axes:
-        refuse("joints", "none in a periodic box", [*found])
     return found
 
 

@@ -57,12 +57,15 @@ class Tied:
         Number and kind of each body, by its names.
     fixed : mapping from str to Body
     joints : mapping from str to Joint or Gear
+    periods : tuple of float
+        Of the box, ``inf`` in directions without.
     """
 
     kinds: Mapping[str, Placement]
     bodies: Mapping[str, tuple[int, str]]
     fixed: Mapping[str, Body]
     joints: Mapping[str, AnyJoint]
+    periods: tuple[float, ...]
 
     def __post_init__(self) -> None:
         self._known: dict[Hashable, dict[str, Any]] = {}
@@ -103,9 +106,10 @@ class Tied:
         self, used: Sequence[str], what: AnyJoint | Drive, rubs: Coefficient, name: str
     ) -> tuple[tuple[int, ...], dict[str, Any]]:
         """Return the bodies of a tie, and its formulas, which are made once for all alike."""
-        if counted := [n for n in used if counts_turns(self.joints[n])]:
-            expected = "limits less than a turn apart of joints between repeated bodies"
-            refuse("limits", f"{expected} for {name!r}", counted)
+        counted = [n for n in used if counts_turns(self.joints[n])]
+        if counted and next(iter(self.kinds.values())).body.dimension == 3:
+            expected = "limits less than a turn apart of joints between repeated bodies in space"
+            refuse("limits", f"{expected}, whose placements count no turns, for {name!r}", counted)
         named = [one for n in used for one in self.joints[n].bodies]
         if isinstance(what, Damper) and what.child is not None:
             named += [what.parent, what.child]
@@ -136,7 +140,8 @@ class Tied:
         """Return the formulas of a joint or drive as arguments of a tie."""
         import sympy
 
-        one = Mechanism({**local, "gear": what} if isinstance(what, Gear) else local, tuple(pair))
+        joints = {**local, "gear": what} if isinstance(what, Gear) else local
+        one = Mechanism(joints, tuple(pair), unwound=True, periods=self.periods)
         space = pair[0].manifold if len(pair) == 1 else pair[0].manifold * pair[1].manifold
         is_joint = isinstance(what, Joint | Gear)
         (_, potential, forces), friction, timed = driven(

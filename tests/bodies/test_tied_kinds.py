@@ -1,7 +1,6 @@
 """Joints and drives of repeated bodies, against listed ones and closed forms."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -283,7 +282,7 @@ def test_an_equation_with_the_time_is_followed_as_by_listed_bodies(joint):
     for path, energy in zip((listed, kinds), gained, strict=True):
         assert energy[-1] - energy[0] == pytest.approx(path.work["drive"][-1], rel=1e-3)
     forces = [force for _, name, force in listed.touching[-1] if name == "p"]
-    tied = [force for _, name, force in kinds.touching[-1] if name.startswith("p.")]
+    tied = [force for _, name, force in kinds.touching[-1] if name.partition(".")[0] == "p"]
     assert tied == pytest.approx(forces, rel=1e-3)
 
 
@@ -321,10 +320,9 @@ def test_names_are_checked():
         Arrangement({"large": disc(1.0)}).system(joints={"p": Hinge("world", "large")})
     with pytest.raises(ValueError, match=r"drives\['m'\]"):
         arrangement.system(count=count, drives={"m": Motor("p", 1.0)})
+    wide = Hinge("S 1", "S 2", axis=[0, 0, 1], limits=(-4.0, 4.0))
     with pytest.raises(ValueError, match=r"limits: expected limits less than a turn apart .*'p'"):
-        arrangement.system(count=count, joints={"p": replace(pin, limits=(-4.0, 4.0))})
-    with pytest.raises(ValueError, match="kinds: expected no equations with the time for 'small'"):
-        arrangement.system(count=count, drives={"m": Prescribed("xsmall", time_symbol())})
+        Arrangement({"S": sphere(1.0)}, orientations="all").system(count=2, joints={"p": wide})
     with pytest.raises(TypeError, match=r"drives\['m'\]"):
         arrangement.system(count=count, drives={"m": 3})
     with pytest.raises(ValueError, match=r"q: expected equation 'p.x' of bodies 'small 1' and 'sm"):
