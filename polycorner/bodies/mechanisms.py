@@ -52,6 +52,7 @@ def check_joints(
             if isinstance(joint, Gear):
                 checks.names("first", [joint.first], able)
                 checks.names("second", [joint.second], able)
+                checks.names("further", joint.further, able)
                 continue
             checks.names("parent", [joint.parent], [WORLD, *bodies, *fixed])
             checks.names("child", [joint.child], bodies)
@@ -148,8 +149,7 @@ class Mechanism(Checked):
         for name, joint in self.joints.items():
             if isinstance(joint, Gear):
                 with about(f"joints[{name!r}]"):
-                    both = (self.coordinate(one) for one in (joint.first, joint.second))
-                    found[name] = geared(joint, *both)
+                    found[name] = geared(joint, {n: self.coordinate(n) for n in joint.joints})
                 continue
             some = constraints.equations(joint, *self.sides(joint))
             found |= {f"{name}.{end}": e for end, e in some.items()}
@@ -240,24 +240,33 @@ def completed(
 
 
 def followed(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of joints with those that follow from them by gears."""
+    """Return values of joints with those that follow from them by gears.
+
+    Of a gear of several joints those are zero that are not known, but for the second one, or else
+    the last.
+    """
     found = dict(values)
     gears = [joint for joint in mechanism.joints.values() if isinstance(joint, Gear)]
-    for _ in gears:  # one may follow another
-        for gear in gears:
-            if gear.first in found:
-                found.setdefault(gear.second, gear.ratio * found[gear.first] + gear.phase)
-            elif gear.second in found:
-                found[gear.first] = (found[gear.second] - gear.phase) / gear.ratio
+    for most in (1, math.inf):
+        for gear in gears * len(gears):  # one may follow another
+            missing = [name for name in gear.joints if name not in found]
+            if 0 < len(missing) < len(gear.joints) and len(missing) <= most:
+                found[missing[-1]] = -_off(gear, found) / gear.coefficients[missing[-1]]
     for gear in gears:
-        first, second = (found.get(name, 0.0) for name in (gear.first, gear.second))
-        off = gear.ratio * first + gear.phase - second
+        off = _off(gear, found)
         if isinstance(mechanism.joints[gear.second], Hinge):
             off = math.remainder(off, math.tau)
-        if gear.first in found and abs(off) > DEFAULT.near:
-            expected = f"{gear.second!r} at {gear.ratio:g} times {gear.first!r}, by their gear"
-            refuse("joints", expected, second)
+        if not found.keys().isdisjoint(gear.joints) and abs(off) > DEFAULT.near:
+            ratios = ", ".join(f"{-c:g} times {n!r}" for n, c in gear.coefficients.items())
+            expected = f"{gear.second!r} at {ratios.rpartition(', ')[0]}, by their gear"
+            refuse("joints", expected, found.get(gear.second, 0.0))
     return found
+
+
+def _off(gear: Gear, values: Mapping[str, Any]) -> float:
+    """Return by how much a gear does not hold; joints without a value are at zero."""
+    parts = (c * values.get(name, 0.0) for name, c in gear.coefficients.items())
+    return float(sum(parts) - gear.phase)
 
 
 def _known(joint: Joint, poses: Mapping[str, Any]) -> int:

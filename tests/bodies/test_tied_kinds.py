@@ -17,6 +17,7 @@ from polycorner.bodies import (
     Hinge,
     Motor,
     Prescribed,
+    Rail,
     Slider,
     Spring,
     capsule,
@@ -131,6 +132,25 @@ def test_masses_on_geared_sliders_are_atwoods_machine():
     a = -(4 - 1) / (4 + 1) * G
     np.testing.assert_allclose(path["A"].q[:, 0, 1], a * path.times**2 / 2, atol=1e-9)
     np.testing.assert_allclose(path["B"].q[:, 0, 1], -a * path.times**2 / 2, atol=1e-9)
+
+
+def test_a_gear_of_three_joints_ties_two_bodies():
+    """``y = -x + (y - x) / 2`` is ``y = -3 x``, and ``(m_1 + 9 m_2) x'' = (3 m_2 - m_1) g``."""
+    arrangement = Arrangement(
+        {"A": disc(1.0), "B": disc(0.5)},
+        joints={
+            "left": Slider("world", "A", axis=[0, 1]),
+            "right": Slider("world", "B", at=[3, 0], axis=[0, 1]),
+            "apart": Rail("A", "B", at=[3, 0], axis=[0, 1]),
+            "rope": Gear("left", "right", -1.0, further={"apart": 0.5}),
+        },
+    )
+    system = arrangement.system(gravity=[0, -G], count={"A": 1, "B": 1})
+    q = split(arrangement, arrangement.point(joints={"left": 0.0}))
+    path = simulate(system, system.state(q), 0.5, 1e-3)
+    a = (3 * 1 - 4) / (4 + 9 * 1) * G
+    np.testing.assert_allclose(path["A"].q[:, 0, 1], a * path.times**2 / 2, atol=1e-9)
+    np.testing.assert_allclose(path["B"].q[:, 0, 1], -3 * a * path.times**2 / 2, atol=1e-9)
 
 
 def hanging(n, pull, **laws):
