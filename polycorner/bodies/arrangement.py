@@ -32,7 +32,7 @@ from polycorner.bodies.neighbours import Pair, check_room, check_width, pairs
 from polycorner.bodies.pairs import Tree, apart, both_sharp, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
 from polycorner.bodies.shapes import Body
-from polycorner.bodies.systems import Asked, system_of
+from polycorner.bodies.systems import Asked, ByName, system_of
 from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
 from polycorner.motion.assembly import Assembly
@@ -273,20 +273,20 @@ class Arrangement(Checked, Printed):
         *,
         gravity: ArrayLike | Sequence[Any] | None = None,
         density: float = 1.0,
-        masses: Mapping[str, Any] | None = None,
+        masses: ByName = None,
         friction: Coefficients = 0.0,
         rolling: Coefficients = 0.0,
         restitution: Restitution = 0.0,
-        attraction: Attractions | None = None,
+        attraction: Attractions = None,
         impact: str = "poisson",
         exits: Mapping[str, float] | None = None,
         count: int | Mapping[str, int] = 1,
-        joints: Mapping[str, Any] | None = None,
+        joints: ByName = None,
         drives: Mapping[str, Drive] | None = None,
-        forces: Mapping[str, Any] | None = None,
+        forces: ByName = None,
         rates: Mapping[str, float] | None = None,
-        limits: Mapping[str, Any] | None = None,
-        nonholonomic: Mapping[str, Any] | None = None,
+        limits: ByName = None,
+        nonholonomic: ByName = None,
     ) -> System | Assembly:
         """Return the mechanical system of the bodies.
 

@@ -29,7 +29,7 @@ Coefficient = float | Both
 # Names are words and pairs of them, of which a mapping may have both.
 Coefficients = Coefficient | Mapping[Any, Coefficient]
 Restitution = float | Mapping[Any, float]
-Attractions = Attraction | Mapping[Any, Attraction]
+Attractions = Attraction | Mapping[Any, Attraction] | None
 signatures.NAMES |= {
     Coefficients: "Coefficients",
     Restitution: "Restitution",
@@ -70,7 +70,7 @@ def laws_of(
     restitution: Restitution,
     meetings: Sequence[Meeting],
     moving: Iterable[str],
-    attraction: Attractions | None = None,
+    attraction: Attractions = None,
 ) -> ContactLaws:
     """Return the laws of all contacts; ``moving`` are the bodies or kinds that move.
 

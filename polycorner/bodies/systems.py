@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from polycorner import checks
+from polycorner import checks, signatures
 from polycorner.bodies.checking import check_together
 from polycorner.bodies.drives import counted_energy, driven, split
 from polycorner.bodies.dynamics import (
@@ -34,6 +34,9 @@ from polycorner.motion.limits import rate_limits
 from polycorner.motion.system import System
 from polycorner.motion.ties import Tie
 from polycorner.values import Value
+
+ByName = Mapping[str, Any] | None
+signatures.NAMES[ByName] = "ByName"
 
 
 @dataclass(frozen=True, eq=False)
