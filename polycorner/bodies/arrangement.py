@@ -1,8 +1,8 @@
 """Arrangements: rigid bodies, what stands between them, and their placements without overlap."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from dataclasses import dataclass, field
+from functools import reduce
 from itertools import chain
 from operator import mul
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,44 +14,29 @@ from polycorner import checks
 from polycorner.bodies.checking import angular, check_together, named
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.constraints import orients
-from polycorner.bodies.drives import Drive, counted_energy, driven, rate_of, split
-from polycorner.bodies.dynamics import (
-    between,
-    energies,
-    friction_of,
-    listed_hulls,
-    masses_of,
-    rubbing_hulls,
-    touching_twins,
-)
-from polycorner.bodies.joints import WORLD, AnyJoint
+from polycorner.bodies.drives import Drive, rate_of
+from polycorner.bodies.joints import AnyJoint
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
-from polycorner.bodies.laws import Coefficients, Meeting, Restitution, laws_of
+from polycorner.bodies.laws import Attractions, Coefficients, Restitution
 from polycorner.bodies.mechanisms import (
     Mechanism,
     check_joints,
     closed,
     completed,
     followed,
+    joined,
     moved_along,
 )
 from polycorner.bodies.neighbours import Pair, check_room, check_width, pairs
-from polycorner.bodies.pairs import Touch, Tree, apart, both_sharp, distances, members
+from polycorner.bodies.pairs import Tree, apart, both_sharp, members
 from polycorner.bodies.poses import Placement, coordinates, frame_of, rates
-from polycorner.bodies.scenes import BodiesInSpace
-from polycorner.bodies.several import assembly, check_size, tied
 from polycorner.bodies.shapes import Body
-from polycorner.bodies.ties import bouncing, met, owned
+from polycorner.bodies.systems import Asked, ByName, system_of
 from polycorner.bodies.walls import Wall, WallTouch, within
 from polycorner.checks import refuse
-from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.assembly import Assembly
-from polycorner.motion.hulls.contacts import HullContacts
-from polycorner.motion.limits import rate_limits
 from polycorner.motion.system import System
-from polycorner.motion.ties import Tie
-from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.symmetry import Symmetry
 from polycorner.printing import Printed, Sheet, few, listed
@@ -104,7 +89,7 @@ class Arrangement(Checked, Printed):
         Equations ``<name>.x``, ... of the placements, and the inequalities ``<name>.min`` and
         ``<name>.max`` of limits.  Bodies that a joint connects do not touch each other, unless it
         says ``collide=True``.  They have all coordinates of an orientation, unless joints hold
-        them on their axis alone.
+        them on their axis alone.  In a periodic box they join nearest images.
 
     Raises
     ------
@@ -160,8 +145,8 @@ class Arrangement(Checked, Printed):
         check_joints(self.joints, self.named, self.fixed)
         if self.joints and self.orientations == "none":
             refuse("orientations", "'needed' or 'all' where there are joints", "none")
-        if self.joints and self.lattice.axes:
-            refuse("period", "none where there are joints", self.period)
+        if self.joints:
+            check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
         if self.period is not None:
             object.__setattr__(self, "period", tuple(self.lattice.lengths.tolist()))
         check_room(self.lattice, self.placements, self.walls)
@@ -246,17 +231,12 @@ class Arrangement(Checked, Printed):
     @cached_property
     def polyhedron(self) -> Polyhedron:
         """``D``, the placements without overlap in which joints hold."""
-        return self._joined(self.contacts(excluded=True))
-
-    def _joined(self, parts: list[Tree]) -> Polyhedron:
-        """Return placements with the limits and equations of joints."""
-        limits = [SmoothFunction(*one, self.manifold) for one in self.mechanism.limits.items()]
-        return Polyhedron(self.manifold, AllOf(*parts, *limits), self.mechanism.equations)
+        return joined(self.mechanism, self.manifold, self.contacts(excluded=True))
 
     @cached_property
     def mechanism(self) -> Mechanism:
         """The formulas of joints."""
-        return Mechanism(self.joints, self.placements)
+        return Mechanism(self.joints, self.placements, periods=tuple(self.lattice.lengths.tolist()))
 
     def contacts(self, *, excluded: bool, sharp: bool = True) -> list[Tree]:
         """Return the and/or trees of pairs of parts, of ``sharp`` ones too, and the gaps at walls.
@@ -293,19 +273,20 @@ class Arrangement(Checked, Printed):
         *,
         gravity: ArrayLike | Sequence[Any] | None = None,
         density: float = 1.0,
-        masses: Mapping[str, Any] | None = None,
+        masses: ByName = None,
         friction: Coefficients = 0.0,
         rolling: Coefficients = 0.0,
         restitution: Restitution = 0.0,
+        attraction: Attractions = None,
         impact: str = "poisson",
         exits: Mapping[str, float] | None = None,
         count: int | Mapping[str, int] = 1,
-        joints: Mapping[str, Any] | None = None,
+        joints: ByName = None,
         drives: Mapping[str, Drive] | None = None,
-        forces: Mapping[str, Any] | None = None,
+        forces: ByName = None,
         rates: Mapping[str, float] | None = None,
-        limits: Mapping[str, Any] | None = None,
-        nonholonomic: Mapping[str, Any] | None = None,
+        limits: ByName = None,
+        nonholonomic: ByName = None,
     ) -> System | Assembly:
         """Return the mechanical system of the bodies.
 
@@ -337,6 +318,10 @@ class Arrangement(Checked, Printed):
             (r + s)`` for two rounded parts; none at the sides of polygons and polyhedra.
         restitution : float or mapping from str or (str, str) to float, optional
             As in :class:`~polycorner.System`; names as for ``friction``.
+        attraction : Attraction, or mapping from str or (str, str) to Attraction, optional
+            At each contact (:class:`~polycorner.motion.Attraction`), or by name as ``friction``;
+            default none.  Between repeated bodies its work is ``path.work["attraction"]``;
+            elsewhere its energy is part of the ``potential``.
         impact : str, optional
             Law of impact, as in :class:`~polycorner.System`.
         exits : mapping from str to float, optional
@@ -374,7 +359,8 @@ class Arrangement(Checked, Printed):
         Raises
         ------
         NotImplementedError
-            For images of sharp bodies that are listed, and for rolling that is not covered.
+            For images of sharp bodies that are listed, for rolling that is not covered, and for
+            attraction between sharp bodies.
 
         Examples
         --------
@@ -389,103 +375,9 @@ class Arrangement(Checked, Printed):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
-        limited = self._limited(count, rates, limits, nonholonomic)
-        if isinstance(count, Mapping):
-            check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
-            alone = {p: self._alone(p) for p in self.placements}
-            given = {"friction": friction, "rolling": rolling, "restitution": restitution}
-            some = {"masses": masses, "exits": exits, "drives": drives, "forces": forces}
-            further = {name: one or {} for name, one in some.items()}
-            own = {name for one in alone.values() for name in one.joints}
-            held = {name: joint for name, joint in self.joints.items() if name not in own}
-            held |= self._further(joints)
-            return assembly(
-                alone, count, given, further, held, gravity=gravity, density=density, impact=impact
-            )
-        if checks.whole("count", count, least=1) > 1 and len(self.placements) > 1:
-            refuse("count", "1, or numbers by name, for several bodies", count)
-        if len(self.placements) > 1:
-            check_size(self.pairs, self.manifold.size)
-        held, ties = self._further(joints), list[Tie]()
-        friction, rubbing_ties = split(friction, held)
-        if count > 1:
-            alone = {self.placements[0]: self}
-            (drives,), ties = tied(
-                alone, {self.placements[0].name: count}, held, drives or {}, rubbing_ties
-            )
-        elif held:
-            refuse("joints", "those of the arrangement where count is 1", [*held])
-        weights = masses_of(self.placements, density, {} if masses is None else masses)
-        laws = energies(self.placements, weights, gravity, self.turning)
-        counting = counted_energy(self.mechanism, self.manifold, weights)
-        laws = laws[0] + counting, *laws[1:]
-        friction, rubbing_joints = split(friction, self.joints)
-        of_joints = self.mechanism, self.manifold, [WORLD, *self.fixed, *self.named]
-        laws, moved, timed = driven(*of_joints, laws, drives, forces, rubbing_joints)
-        touches: list[Touch] = []
-        hulls: list[tuple[HullContacts, Pair]] = []
-        for pair in self.pairs:
-            if both_sharp(*pair):
-                hulls.append((listed_hulls(pair[0], pair[1], self.scale), pair))
-            else:
-                touches += distances(self.manifold, *pair)
-        meetings = [Meeting(t.gap.name, t.one.body, t.two.body) for t in touches]
-        meetings += [Meeting(n, a.body, b.body) for one, (a, b) in hulls for n in one.names]
-        meetings += [Meeting(t.gap.name, t.member.body, t.name) for t in self.at_walls]
-        ends = {end: end.rpartition(".")[0] for end in self.mechanism.limits}
-        meetings += [Meeting(end, joint, joint) for end, joint in ends.items()]
-        meetings += met(ties)
-        family, first = None, self.placements[0]
-        if count > 1:
-            meetings.append(Meeting(f"{first.name}-{first.name}", first.name, first.name, True))
-        known = laws_of(friction, rolling, restitution, meetings, self.named)
-        if count > 1:
-            check_width(self.lattice, [first.body], [*self.fixed.values()])
-            family = between((first, first), self.lattice, known)
-        placed = self._joined(self.contacts(excluded=False, sharp=False))
-        rubbing = tuple(rubbing_hulls(one, pair[0], pair[1], known) for one, pair in hulls)
-        return System(
-            placed,
-            *laws,
-            friction_of(self.manifold, touches, self.at_walls, known.friction, known.rolling)
-            + moved,
-            restitution={
-                name: known.restitution.get(name, 0.0)
-                for name in chain(placed.names, *(one.names for one in rubbing))
-            },
-            count=count,
-            between=family,
-            exits={} if exits is None else exits,
-            hulls=rubbing,
-            rheonomic=timed,
-            scene=BodiesInSpace(
-                self.placements,
-                tuple(touches),
-                tuple(self.at_walls),
-                frozenset(self.walls),
-                count,
-                partial(touching_twins, (first, first), self.lattice),
-                tuple((one, (a.body, b.body)) for one, (a, b) in hulls),
-            ),
-            ties=bouncing(ties, known.restitution),
-            impact=impact,
-            **limited,
-        )
-
-    def _further(self, joints: Any) -> dict[str, AnyJoint]:
-        """Return joints of repeated bodies, after checking their names."""
-        found = {} if joints is None else dict(checks.mapping("joints", joints))
-        check_together(self.named, self.fixed, self.walls, [*self.joints, *found])
-        if found and self.lattice.axes:
-            refuse("joints", "none in a periodic box", [*found])
-        return found
-
-    def _alone(self, p: Placement) -> "Arrangement":
-        """Return the arrangement of one of the bodies, in the units of all."""
-        own = owned(self.joints, p.name, self.fixed)
-        one = replace(self, bodies={p.name: p.body}, joints=own)
-        vars(one).update(scale=self.scale, placements=(replace(p, at=slice(0, p.manifold.size)),))
-        return one
+        laws = gravity, density, masses, friction, rolling, restitution, attraction, impact
+        more = exits, count, joints, drives, forces, rates, limits, nonholonomic
+        return system_of(self, Asked(*laws, *more))
 
     @cached_property
     def symmetry(self) -> Symmetry:
@@ -556,24 +448,6 @@ class Arrangement(Checked, Printed):
     def joint_function(self, name: str) -> "sympy.Expr":
         """Return the angle of a joint, in radians up to half a turn, or its position: a formula."""
         return self.mechanism.coordinate(checks.instance("name", name, str), "name").value()
-
-    def _limited(
-        self,
-        count: int | Mapping[str, int],
-        rates: Mapping[str, float] | None,
-        limits: Mapping[str, Any] | None,
-        nonholonomic: Mapping[str, Any] | None,
-    ) -> dict[str, Any]:
-        """Return the arguments of a system for limits on velocities."""
-        bounds = checks.mapping("rates", {} if rates is None else rates)
-        checks.names("rates", bounds, self.joints)
-        turning = {name: self.joint_rate(name) for name in bounds}
-        further = checks.mapping("limits", {} if limits is None else limits)
-        given = {**rate_limits(turning, bounds), **further}
-        equations = checks.mapping("nonholonomic", {} if nonholonomic is None else nonholonomic)
-        if isinstance(count, Mapping) and (given or equations):
-            refuse("limits", "none where count has names", [*given, *equations])
-        return {"limits": given, "nonholonomic": equations}
 
     def joint_rate(self, name: str) -> "sympy.Expr":
         """Return the rate of a joint's angle or position as a formula, in the velocities too."""

@@ -15,7 +15,7 @@ torques on the child.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import singledispatch
 from typing import TYPE_CHECKING, Any
@@ -25,6 +25,7 @@ from scipy.spatial.transform import Rotation
 
 from polycorner import checks
 from polycorner.bodies.holds import Angle, Coordinate, Holding, Position, across, hamilton, times
+from polycorner.bodies.images import wrapped
 from polycorner.bodies.joints import AnyJoint, Ball, Fixed, Gear, Hinge, Joint, Planar, Rail, Slider
 from polycorner.bodies.shapes import Body, turning
 from polycorner.checks import about, refuse
@@ -96,8 +97,16 @@ def _axis(joint: Joint) -> Array:
 
 def away(joint: Joint, one: Holding, two: Holding) -> "Point":
     """Return the way ``w`` from the parent's anchor to the child's, in the axes of space."""
-    at, on = anchors(joint, two.dimension)
-    x, y, z = (q - p for p, q in zip(one.point(at), two.point(on), strict=True))
+    return way(one, two, *anchors(joint, two.dimension))
+
+
+def way(one: Holding, two: Holding, here: Array, there: Array) -> "Point":
+    """Return the way from a point of a body to the nearest image of one of another, in space."""
+    ends, periods = (one.point(here), two.point(there)), (*one.periods, *[math.inf] * 3)
+    x, y, z = (
+        wrapped(math.tau * (q - p) / period, period) if math.isfinite(period) else q - p
+        for p, q, period in zip(*ends, periods, strict=False)
+    )
     return x, y, z
 
 
@@ -211,24 +220,37 @@ def coordinate(joint: Joint, one: Holding, two: Holding) -> Coordinate:
     return Position(one.along(away(joint, one, two), _axis(joint)))
 
 
-def geared(gear: Gear, first: Coordinate, second: Coordinate) -> "sympy.Expr":
+def geared(gear: Gear, joints: Mapping[str, Coordinate]) -> "sympy.Expr":
     """Return the equation of a gear, whose multiplier is the force or torque on the second child.
 
     Half a multiple of angles is the phase of a power of a complex number, so that the equation is
     smooth however often they go round.
     """
-    ratio, phase = gear.ratio, gear.phase
-    if isinstance(first, Position) and isinstance(second, Position):
-        return second.plain - ratio * first.plain - phase
-    teeth, of_first = (1 / ratio, 1.0) if isinstance(second, Position) else (1.0, ratio)
-    if isinstance(first, Angle) and isinstance(second, Angle):
-        whole = Fraction(ratio).limit_denominator(gear.teeth)
-        if abs(float(whole) - ratio) > DEFAULT.rounding * abs(ratio):
-            refuse("ratio", f"a fraction with a denominator of at most {gear.teeth}", ratio)
-        teeth, of_first = float(whole.denominator), float(whole.numerator)
-    start = math.cos(teeth * phase / 2), -math.sin(teeth * phase / 2)
-    _, sine = times(second.phase(teeth), times(first.phase(-of_first), start))
-    return 2 / teeth * sine
+    coefficients = gear.coefficients
+    wholes = _wholes(gear, [n for n in gear.joints if isinstance(joints[n], Angle)])
+    if not wholes:
+        return sum(c * joints[n].value() for n, c in coefficients.items()) - gear.phase
+    last = [*wholes][-1]
+    teeth = wholes[last] / coefficients[last]
+    phase = math.cos(teeth * gear.phase / 2), -math.sin(teeth * gear.phase / 2)
+    for name, c in coefficients.items():
+        phase = times(joints[name].phase(float(wholes.get(name, teeth * c))), phase)
+    return 2 / teeth * phase[1]
+
+
+def _wholes(gear: Gear, hinges: Sequence[str]) -> dict[str, int]:
+    """Return whole numbers in the ratios of the coefficients of hinges, without common divisor."""
+    parts = {}
+    for name in hinges:
+        exact = gear.coefficients[name] / gear.coefficients[hinges[-1]]
+        parts[name] = Fraction(exact).limit_denominator(gear.teeth)
+        if abs(float(parts[name]) - exact) > DEFAULT.rounding * abs(exact):
+            argument = "ratio" if name == gear.first else "further"
+            refuse(argument, f"a fraction with a denominator of at most {gear.teeth}", abs(exact))
+    common = math.lcm(*(part.denominator for part in parts.values()))
+    found = {name: int(part * common) for name, part in parts.items()}
+    divisor = math.gcd(*found.values())
+    return {name: number // divisor for name, number in found.items()}
 
 
 def inequalities(one: Coordinate, low: float, high: float) -> "Expressions":

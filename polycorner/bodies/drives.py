@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks, signatures
+from polycorner.bodies.constraints import way
 from polycorner.bodies.frames import Frame
 from polycorner.bodies.holds import Angle, Coordinate, Position, hamilton, slopes_of
 from polycorner.bodies.laws import Coefficient, static_and_dynamic
@@ -240,7 +241,7 @@ class Driven:
     def _between(self, drive: Damper) -> "list[sympy.Expr]":
         """Return the way between the anchors."""
         placements = {p.name: p for p in self.mechanism.placements}
-        d, ends = self.mechanism.placements[0].body.dimension, []
+        d, ends, anchors = self.mechanism.placements[0].body.dimension, list[Any](), list[Any]()
         checks.names("parent", [drive.parent], self.known)
         checks.names("child", [drive.child or ""], placements)
         for argument, name, anchor in (
@@ -254,8 +255,9 @@ class Driven:
             if p is not None and _shows_axis(p) and _off(local, p.axis) > DEFAULT.alike:
                 expected = f"an anchor on the axis of {name!r}, or orientations='all'"
                 refuse(argument, expected, local.tolist())
-            ends.append(hold.point(local))
-        return [q - p for p, q in zip(*ends, strict=True)][:d]
+            ends.append(hold)
+            anchors.append(local)
+        return [*way(*ends, *anchors)][:d]
 
     def motor(self, name: str, drive: Motor) -> None:
         """Add a motor: a torque, or friction on what moves at its speed."""

@@ -24,8 +24,9 @@ from polycorner.bodies.slips import ROLLING, SLIDING, slips_at_wall, slips_of
 from polycorner.bodies.walls import WallTouch
 from polycorner.checks import refuse
 from polycorner.formulas.expressions import as_expression
-from polycorner.formulas.functions import SmoothFunction
+from polycorner.formulas.functions import SmoothFunction, with_numbers
 from polycorner.formulas.fusion import written_out
+from polycorner.motion.attraction import Attraction
 from polycorner.motion.bodies import RUBBING, PairLaw
 from polycorner.motion.contacts import (
     PAIR,
@@ -242,6 +243,17 @@ def friction_of(
     )
 
 
+def attraction_of(
+    touches: list[Touch], walls: list[WallTouch], pulls: Mapping[str, Attraction]
+) -> "sympy.Expr":
+    """Return the potential energy of the attraction at contacts by name."""
+    import sympy
+
+    gaps = [*(t.gap for t in touches), *(t.gap for t in walls)]
+    pulled = (pulls[g.name].energy(with_numbers(g)) for g in gaps if g.name in pulls)
+    return sum(pulled, sympy.S.Zero)
+
+
 def _set(mu: float, dimension: int) -> ConvexSet:
     return Interval(mu) if dimension == 2 else Disc(mu)
 
@@ -308,6 +320,8 @@ def between(
     definitions, gaps = written_out({t.gap.name: t.gap for t in touches})
     both, laws = motions(space), []
     name = "-".join(p.name for p in placements)
+    if sharp:
+        _refuse_attraction(known.attraction.get(name))
     for argument, given, kind, cause in (
         ("friction", known.friction, SLIDING, RUBBING),
         ("rolling", known.rolling, ROLLING, ROLLING),
@@ -333,6 +347,7 @@ def between(
             friction=tuple(laws),
             restitution=restitution,
             definitions=definitions,
+            attraction=known.attraction.get(name),
         )
     hulls = _twin_hulls(pair, meeting, lattice)
     if hulls is None:
@@ -354,6 +369,16 @@ def _refuse_rolling(given: float) -> NoReturn:
         f"{given}"
     )
     raise NotImplementedError(msg)
+
+
+def _refuse_attraction(given: Attraction | None) -> None:
+    """Raise for attraction between sharp parts, whose gaps begin and end as these turn and pass."""
+    if given is not None:
+        msg = (
+            f"attraction: expected none between sharp polygons or polyhedra, whose gaps have no "
+            f"potential energy (round one of them); got {given}"
+        )
+        raise NotImplementedError(msg)
 
 
 def listed_hulls(one: PlacedPart, two: PlacedPart, scale: float) -> HullContacts:
@@ -378,6 +403,7 @@ def rubbing_hulls(
     """Return contacts of two sharp parts with friction by the laws of each."""
     d, rubbing = one.part.dimension, {}
     for label in contacts.names:
+        _refuse_attraction(known.attraction.get(label))
         if known.rolling.get(label, NONE)[0]:
             _refuse_rolling(known.rolling[label][0])
         static, dynamic = known.friction.get(label, NONE)

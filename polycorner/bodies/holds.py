@@ -19,12 +19,16 @@ if TYPE_CHECKING:
 
 
 class Holding(NamedTuple):
-    """What a joint takes hold of: a body, or space, in whose coordinates fixed bodies are."""
+    """What a joint takes hold of: a body, or space, in whose coordinates fixed bodies are.
+
+    In a periodic box it has images, after ``periods``.
+    """
 
     name: str
     frame: Frame
     dimension: int
     axis: Array | None
+    periods: tuple[float, ...] = ()
 
     def point(self, local: Array) -> "Point":
         """Return where a point of it is."""

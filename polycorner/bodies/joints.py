@@ -1,6 +1,7 @@
 """Joints between bodies, or of one with space, as users describe them."""
 
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -236,7 +237,10 @@ class Gear(Checked):
     """A gear: the coordinate of one joint is a multiple of that of another; one equation.
 
     It joins two hinges, a hinge and a slider (a rack and a pinion, a screw) or two sliders:
-    ``second = ratio * first + phase``.  Angles count modulo a turn.
+    ``second = ratio * first + phase``.  Angles count modulo a turn.  With ``further`` joints it is
+    a differential, ``second = ratio * first + sum(further[name] * name) + phase``: of a planetary
+    gear whose sun has ``s`` teeth and whose ring has ``r``,
+    ``Gear("sun", "ring", -s / r, further={"carrier": 1 + s / r})``.
 
     Parameters
     ----------
@@ -246,9 +250,11 @@ class Gear(Checked):
         Not zero; negative for wheels that roll on each other.  Of two hinges a fraction with a
         denominator of at most ``teeth``, in lowest terms.
     phase : float, optional
-        Of the second one where the first one is zero; default 0.
+        Of the second one where all others are zero; default 0.
     teeth : int, optional
-        The largest denominator of the ratio of two hinges; default 1000.
+        The largest denominator of the ratios of hinges; default 1000.
+    further : mapping from str to float, optional
+        Ratios of further joints, as ``ratio``; default none.
     """
 
     first: str
@@ -256,23 +262,42 @@ class Gear(Checked):
     ratio: float
     phase: float = 0.0
     teeth: int = 1000
+    further: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_fields(self)
         if self.first == self.second:
             refuse("second", f"another joint than {self.first!r}", self.second)
-        ratio = checks.real("ratio", self.ratio)
-        if ratio == 0:
-            refuse("ratio", "a number that is not zero", self.ratio)
-        object.__setattr__(self, "ratio", ratio)
+        if both := {self.first, self.second} & self.further.keys():
+            refuse("further", "joints other than the first and the second one", min(both))
+        object.__setattr__(self, "ratio", _ratio("ratio", self.ratio))
+        more = {name: _ratio("further", x) for name, x in self.further.items()}
+        object.__setattr__(self, "further", more)
         object.__setattr__(self, "phase", checks.real("phase", self.phase))
         checks.whole("teeth", self.teeth, least=1)
         super().__post_init__()
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """None: the two joints have them."""
+        """None: the joints have them."""
         return ()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The names of the joints, the second one last."""
+        return self.first, *self.further, self.second
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """By these names those of the sum that is :attr:`phase`, of the second one 1."""
+        return {self.first: -self.ratio, **{n: -x for n, x in self.further.items()}, self.second: 1}
+
+
+def _ratio(argument: str, given: Any) -> float:
+    ratio = checks.real(argument, given)
+    if ratio == 0:
+        refuse(argument, "a number that is not zero", given)
+    return ratio
 
 
 AnyJoint = Joint | Gear

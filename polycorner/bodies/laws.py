@@ -1,4 +1,4 @@
-"""Coefficients of friction, rolling and restitution by the names of what touches.
+"""Friction, rolling, restitution and attraction by the names of what touches.
 
 For each contact the most specific of the names holds that are given:
 
@@ -8,7 +8,7 @@ For each contact the most specific of the names holds that are given:
 4. the wall or fixed body, ``"floor"``;
 5. the body or kind of bodies that moves, ``"A"``.  Where both have a value, these have to agree.
 
-Contacts that no name tells of have no friction and are plastic.
+Contacts that no name tells of have no friction and no attraction, and are plastic.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,6 +20,7 @@ import numpy as np
 from polycorner import checks, signatures
 from polycorner.checks import refuse
 from polycorner.errors import nearest
+from polycorner.motion.attraction import Attraction
 
 BETWEEN = "between"  # the name of the contacts among repeated bodies
 
@@ -28,7 +29,12 @@ Coefficient = float | Both
 # Names are words and pairs of them, of which a mapping may have both.
 Coefficients = Coefficient | Mapping[Any, Coefficient]
 Restitution = float | Mapping[Any, float]
-signatures.NAMES |= {Coefficients: "Coefficients", Restitution: "Restitution"}
+Attractions = Attraction | Mapping[Any, Attraction] | None
+signatures.NAMES |= {
+    Coefficients: "Coefficients",
+    Restitution: "Restitution",
+    Attractions: "Attractions",
+}
 
 T = TypeVar("T")
 
@@ -55,6 +61,7 @@ class ContactLaws(NamedTuple):
     friction: dict[str, Both]
     rolling: dict[str, Both]
     restitution: dict[str, float]
+    attraction: dict[str, Attraction]
 
 
 def laws_of(
@@ -63,8 +70,9 @@ def laws_of(
     restitution: Restitution,
     meetings: Sequence[Meeting],
     moving: Iterable[str],
+    attraction: Attractions = None,
 ) -> ContactLaws:
-    """Return the coefficients of all contacts; ``moving`` are the bodies or kinds that move.
+    """Return the laws of all contacts; ``moving`` are the bodies or kinds that move.
 
     Raises
     ------
@@ -73,13 +81,21 @@ def laws_of(
         coefficients differ where they touch.
     """
     moving = frozenset(moving)
+    # The limits of joints are no contacts of bodies.
+    touching = [m for m in meetings if m.one in moving or m.two in moving]
+    pulls = {} if attraction is None else attraction
     bounces = partial(checks.real, "restitution", least=0, most=1)
     rubs, rolls = (partial(static_and_dynamic, name) for name in ("friction", "rolling"))
     return ContactLaws(
         _by_contact("friction", friction, meetings, moving, rubs),
         _by_contact("rolling", rolling, meetings, moving, rolls),
         _by_contact("restitution", restitution, meetings, moving, bounces),
+        _by_contact("attraction", pulls, touching, moving, _pull),
     )
+
+
+def _pull(given: Any) -> Attraction:
+    return checks.instance("attraction", given, Attraction)
 
 
 def static_and_dynamic(argument: str, given: Any) -> Both:

@@ -1,7 +1,7 @@
 """Mechanisms: bodies with joints, as formulas, and their placements by angles and positions."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,9 @@ from polycorner.bodies.poses import Placement, pose_of
 from polycorner.bodies.shapes import Body
 from polycorner.checks import about, refuse
 from polycorner.formulas.families import Family
+from polycorner.formulas.functions import SmoothFunction
 from polycorner.motion.placements import onto_equations
+from polycorner.polyhedra.groups import AllOf
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
@@ -50,6 +52,7 @@ def check_joints(
             if isinstance(joint, Gear):
                 checks.names("first", [joint.first], able)
                 checks.names("second", [joint.second], able)
+                checks.names("further", joint.further, able)
                 continue
             checks.names("parent", [joint.parent], [WORLD, *bodies, *fixed])
             checks.names("child", [joint.child], bodies)
@@ -66,17 +69,24 @@ class Mechanism(Checked):
     ----------
     joints : mapping from str to Joint or Gear
     placements : tuple of Placement
+    unwound : bool, optional
+        Whether angles of bodies in the plane count turns, as along a motion, so that no coordinate
+        has to; default not: they are points of circles.
+    periods : tuple of float, optional
+        Of a box whose images are joined, ``inf`` in directions without.
     """
 
     joints: Mapping[str, AnyJoint]
     placements: tuple[Placement, ...]
+    unwound: bool = False
+    periods: tuple[float, ...] = ()
 
     def hold(self, name: str) -> Holding:
         """Return what joints take hold of by a name; that of no body that moves is space."""
         d = self.placements[0].body.dimension
         found = (p for p in self.placements if p.name == name)
-        bodies = (Holding(name, p.frame, d, p.body.axis) for p in found)
-        return next(bodies, Holding(name, Frame.FIXED, d, None))
+        bodies = (Holding(name, p.frame, d, p.body.axis, self.periods) for p in found)
+        return next(bodies, Holding(name, Frame.FIXED, d, None, self.periods))
 
     def sides(self, joint: Joint) -> tuple[Holding, Holding]:
         """Return what a joint takes hold of."""
@@ -91,12 +101,18 @@ class Mechanism(Checked):
             refuse(argument, able, name)
         if name in self.counters:
             return Position(*symbols([self.counters[name]]))
+        if counts_turns(joint):
+            plain = self.angle(name).plain
+            assert plain is not None, name
+            return Position(plain)
         return constraints.coordinate(joint, *self.sides(joint))
 
     @property
     def counters(self) -> dict[str, str]:
         """The coordinates that count the turns of hinges, by the names of these."""
-        counted = [name for name, joint in self.joints.items() if counts_turns(joint)]
+        counted = [
+            n for n, joint in self.joints.items() if counts_turns(joint) and not self.unwound
+        ]
         return {name: f"turned{k}" for k, name in enumerate(counted, 1)}
 
     def angle(self, name: str) -> Angle:
@@ -133,8 +149,7 @@ class Mechanism(Checked):
         for name, joint in self.joints.items():
             if isinstance(joint, Gear):
                 with about(f"joints[{name!r}]"):
-                    both = (self.coordinate(one) for one in (joint.first, joint.second))
-                    found[name] = geared(joint, *both)
+                    found[name] = geared(joint, {n: self.coordinate(n) for n in joint.joints})
                 continue
             some = constraints.equations(joint, *self.sides(joint))
             found |= {f"{name}.{end}": e for end, e in some.items()}
@@ -171,6 +186,12 @@ class Mechanism(Checked):
             for joint in self.joints.values()
             if isinstance(joint, Joint) and not joint.collide
         )
+
+
+def joined(mechanism: Mechanism, manifold: Manifold, parts: Iterable[Any]) -> Polyhedron:
+    """Return placements in which joints hold, with given and/or trees of gaps."""
+    limits = [SmoothFunction(*one, manifold) for one in mechanism.limits.items()]
+    return Polyhedron(manifold, AllOf(*parts, *limits), mechanism.equations)
 
 
 def completed(
@@ -219,24 +240,33 @@ def completed(
 
 
 def followed(mechanism: Mechanism, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of joints with those that follow from them by gears."""
+    """Return values of joints with those that follow from them by gears.
+
+    Of a gear of several joints those are zero that are not known, but for the second one, or else
+    the last.
+    """
     found = dict(values)
     gears = [joint for joint in mechanism.joints.values() if isinstance(joint, Gear)]
-    for _ in gears:  # one may follow another
-        for gear in gears:
-            if gear.first in found:
-                found.setdefault(gear.second, gear.ratio * found[gear.first] + gear.phase)
-            elif gear.second in found:
-                found[gear.first] = (found[gear.second] - gear.phase) / gear.ratio
+    for most in (1, math.inf):
+        for gear in gears * len(gears):  # one may follow another
+            missing = [name for name in gear.joints if name not in found]
+            if 0 < len(missing) < len(gear.joints) and len(missing) <= most:
+                found[missing[-1]] = -_off(gear, found) / gear.coefficients[missing[-1]]
     for gear in gears:
-        first, second = (found.get(name, 0.0) for name in (gear.first, gear.second))
-        off = gear.ratio * first + gear.phase - second
+        off = _off(gear, found)
         if isinstance(mechanism.joints[gear.second], Hinge):
             off = math.remainder(off, math.tau)
-        if gear.first in found and abs(off) > DEFAULT.near:
-            expected = f"{gear.second!r} at {gear.ratio:g} times {gear.first!r}, by their gear"
-            refuse("joints", expected, second)
+        if not found.keys().isdisjoint(gear.joints) and abs(off) > DEFAULT.near:
+            ratios = ", ".join(f"{-c:g} times {n!r}" for n, c in gear.coefficients.items())
+            expected = f"{gear.second!r} at {ratios.rpartition(', ')[0]}, by their gear"
+            refuse("joints", expected, found.get(gear.second, 0.0))
     return found
+
+
+def _off(gear: Gear, values: Mapping[str, Any]) -> float:
+    """Return by how much a gear does not hold; joints without a value are at zero."""
+    parts = (c * values.get(name, 0.0) for name, c in gear.coefficients.items())
+    return float(sum(parts) - gear.phase)
 
 
 def _known(joint: Joint, poses: Mapping[str, Any]) -> int:

@@ -92,8 +92,9 @@ def check_width(lattice: Lattice, kinds: Sequence[Body], fixed: Sequence[Body]) 
     """Raise ValueError unless only one image can touch: of bodies like these, and of fixed ones."""
     reach, shortest = max(reaches([*kinds, *kinds], fixed)), float(min(lattice.lengths))
     if max(lattice.counts(reach)) > 1:
-        least = f"lengths of at least {2 * reach / CLEAR:g} for repeated bodies"
-        refuse("period", f"{least} that touch up to {reach:g} apart", shortest)
+        least = f"lengths of at least {2 * reach / CLEAR:g} for bodies"
+        told = f"{least} that touch up to {reach:g} apart, where any are repeated or joined"
+        refuse("period", told, shortest)
 
 
 def _overlaps(lattice: Lattice, p: Placement) -> bool:

@@ -6,7 +6,7 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 from polycorner import checks
-from polycorner.bodies.drives import Prescribed, split
+from polycorner.bodies.drives import split
 from polycorner.bodies.dynamics import between, listed_hulls, touching_twins
 from polycorner.bodies.joints import WORLD, AnyJoint
 from polycorner.bodies.lattices import Lattice
@@ -38,7 +38,7 @@ def assembly(
         Each kind, and the arrangement of one such body.
     count : mapping from str to int
     laws : mapping from str to coefficients
-        ``friction``, ``rolling`` and ``restitution``.
+        ``friction``, ``rolling``, ``restitution`` and ``attraction``.
     some : mapping from str to mapping
         Further arguments that have values for some of the kinds: ``masses`` and ``forces`` by
         their names, ``exits`` by coordinate, and ``drives``, some of which tie bodies.
@@ -110,25 +110,21 @@ def tied(
     drives, found = checks.mapping("drives", drives), []
     # Joints with space of the only body of its kind, which drives and gears may name.
     known = {n: j for p, one in alone.items() if count[p.name] == 1 for n, j in one.joints.items()}
-    # Equations with the time are those of ties, where there are bodies of several kinds.
-    followed = {
-        n
-        for n, drive in drives.items()
-        if isinstance(drive, Prescribed) and drive.limit is None and drive.of in known
-    }
     for p, one in alone.items():
         around, own = {WORLD, *one.fixed}, {p.name, *p.manifold.names, *one.joints}
         by_name = {n: refers(drive) for n, drive in drives.items()}
         owns = {n for n, told in by_name.items() if told & own and told <= around | own}
-        found.append({n: drive for n, drive in drives.items() if n in owns - followed})
+        found.append({n: drive for n, drive in drives.items() if n in owns})
     further = {n: drive for n, drive in drives.items() if all(n not in own for own in found)}
     if not joints and not further:
         return found, []
+    first = next(iter(alone.values()))
     every = Tied(
         {p.name: p for p in alone},
         names_of([*alone], count),
-        next(iter(alone.values())).fixed,
+        first.fixed,
         {**known, **joints},
+        tuple(first.lattice.lengths.tolist()),
     )
     return found, ties_of(every, joints, further, rubbing)
 

@@ -57,12 +57,15 @@ class Tied:
         Number and kind of each body, by its names.
     fixed : mapping from str to Body
     joints : mapping from str to Joint or Gear
+    periods : tuple of float
+        Of the box, ``inf`` in directions without.
     """
 
     kinds: Mapping[str, Placement]
     bodies: Mapping[str, tuple[int, str]]
     fixed: Mapping[str, Body]
     joints: Mapping[str, AnyJoint]
+    periods: tuple[float, ...]
 
     def __post_init__(self) -> None:
         self._known: dict[Hashable, dict[str, Any]] = {}
@@ -79,7 +82,7 @@ class Tied:
     def joint(self, name: str, rubs: Coefficient) -> Tie:
         """Return a joint with its limits and friction; these do not bounce."""
         joint = self.joints[name]
-        used = (joint.first, joint.second) if isinstance(joint, Gear) else (name,)
+        used = joint.joints if isinstance(joint, Gear) else (name,)
         ends, told = self._formulas(used, joint, rubs, name)
         return Tie(ends, name, **told, collide=isinstance(joint, Gear) or joint.collide)
 
@@ -103,16 +106,19 @@ class Tied:
         self, used: Sequence[str], what: AnyJoint | Drive, rubs: Coefficient, name: str
     ) -> tuple[tuple[int, ...], dict[str, Any]]:
         """Return the bodies of a tie, and its formulas, which are made once for all alike."""
-        if counted := [n for n in used if counts_turns(self.joints[n])]:
-            expected = "limits less than a turn apart of joints between repeated bodies"
-            refuse("limits", f"{expected} for {name!r}", counted)
+        counted = [n for n in used if counts_turns(self.joints[n])]
+        if counted and next(iter(self.kinds.values())).body.dimension == 3:
+            expected = "limits less than a turn apart of joints between repeated bodies in space"
+            refuse("limits", f"{expected}, whose placements count no turns, for {name!r}", counted)
         named = [one for n in used for one in self.joints[n].bodies]
         if isinstance(what, Damper) and what.child is not None:
             named += [what.parent, what.child]
         moving = list(dict.fromkeys(one for one in named if one in self.bodies))
         numbers = tuple(self.bodies[one][0] for one in moving)
         if len({*numbers}) < len(numbers) or len(numbers) > len(PAIR):
-            refuse("joints", f"joints of one body or of two different ones for {name!r}", moving)
+            expected = f"joints of one body or of two different ones for {name!r}"
+            why = "repeated bodies are tied two by two, listed ones as you like"
+            refuse("joints", f"{expected}: {why}", moving)
         kinds = [self.kinds[self.bodies[one][1]] for one in moving]
         pair = [
             replace(p, name=f"{p.name}{k}", manifold=renamed(p, f"{p.name}{k}"))
@@ -136,7 +142,8 @@ class Tied:
         """Return the formulas of a joint or drive as arguments of a tie."""
         import sympy
 
-        one = Mechanism({**local, "gear": what} if isinstance(what, Gear) else local, tuple(pair))
+        joints = {**local, "gear": what} if isinstance(what, Gear) else local
+        one = Mechanism(joints, tuple(pair), unwound=True, periods=self.periods)
         space = pair[0].manifold if len(pair) == 1 else pair[0].manifold * pair[1].manifold
         is_joint = isinstance(what, Joint | Gear)
         (_, potential, forces), friction, timed = driven(
@@ -172,11 +179,13 @@ def _joint_of(drive: Drive) -> tuple[str, str]:
 
 def _renamed(one: Any, called: Mapping[str, str]) -> Any:
     """Return a joint or drive of bodies and joints of other names."""
-    given = {
+    given: dict[str, Any] = {
         field.name: called[value]
         for field in fields(one)
         if isinstance(value := getattr(one, field.name), str) and value in called
     }
+    if isinstance(one, Gear):
+        given["further"] = {called[name]: ratio for name, ratio in one.further.items()}
     return replace(one, **given)
 
 
@@ -186,6 +195,8 @@ def _plain(value: Any) -> Hashable:
         return _plain(value.as_quat())
     if isinstance(value, np.ndarray | tuple | list):
         return tuple(np.ravel(value).tolist())
+    if isinstance(value, Mapping):
+        return tuple(value.items())
     if isinstance(value, AnyJoint | Drive):
         told = tuple((field.name, _plain(getattr(value, field.name))) for field in fields(value))
         return type(value).__name__, told
@@ -239,9 +250,7 @@ def owned(joints: Mapping[str, AnyJoint], name: str, fixed: Iterable[str]) -> di
     """Return the joints that each body of a kind has with what does not move, and their gears."""
     around = {WORLD, *fixed, name}
     own = {n: j for n, j in joints.items() if isinstance(j, Joint) and {*j.bodies} <= around}
-    gears = {
-        n: j for n, j in joints.items() if isinstance(j, Gear) and {j.first, j.second} <= own.keys()
-    }
+    gears = {n: j for n, j in joints.items() if isinstance(j, Gear) and own.keys() >= {*j.joints}}
     return own | gears
 
 

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from polycorner.bodies import Arrangement, Cylinder, HalfSpace, Mass, capsule, compound, sphere
 from polycorner.dumbbells.drum import GRAVITY, DumbbellDrum
 from polycorner.dumbbells.drum_motion import effective_gravity, uneven_factor
-from polycorner.motion import ContactFamily, Friction, State, System
+from polycorner.motion import Friction, State, System
 from polycorner.toolkit import (
     LONGEST,
     Array,
@@ -32,7 +32,6 @@ from polycorner.toolkit import (
     reals,
     refuse,
     wave_depth,
-    with_numbers,
 )
 
 BALLS = ("D.1-drum", "D.2-drum")  # contacts of the balls with the drum
@@ -119,23 +118,19 @@ class RigidDumbbells(Checked):
         if drum.count > 1:
             sliding["between"] = drum.rubbing
         restitution = {"between": drum.restitution} if drum.count > 1 else {}
+        wall, among = (drum.attraction(share) for share in (drum.adhesion / 2, drum.cohesion))
+        pulls = dict.fromkeys(BALLS, wall) | ({"between": among} if drum.count > 1 else {})
         system = self.arrangement.system(
             gravity=effective_gravity(drum.imperfections, drum.spin, GRAVITY, drum.tilt),
             masses={"D": self.mass},
             friction=sliding,
             rolling=dict.fromkeys(BALLS, drum.rolling),
             restitution=restitution,
+            attraction={name: pull for name, pull in pulls.items() if pull is not None},
             exits={"yD": drum.top} if math.isfinite(drum.top) else {},
             count=drum.count,
         )
         assert isinstance(system, System)  # of one kind
-        if between := drum.attraction(drum.cohesion):
-            assert isinstance(system.between, ContactFamily)  # of rounded bodies
-            system = replace(system, between=replace(system.between, attraction=between))
-        if wall := drum.attraction(drum.adhesion / 2):
-            gaps = [with_numbers(f) for f in system.polyhedron.functions if f.name in BALLS]
-            potential = sum(map(wall.energy, gaps), system.potential)
-            system = replace(system, potential=potential)
         if drum.uneven_friction is None:
             return system
         return replace(system, friction=tuple(map(self._uneven, system.friction)))

@@ -55,6 +55,31 @@ def _parts(expression: "sympy.Basic") -> "set[sympy.Basic]":
     return seen
 
 
+def substitute(expression: "sympy.Expr", places: "Mapping[Any, Any]") -> "sympy.Expr":
+    """Return a formula with others in place of symbols, as ``xreplace`` does.
+
+    A subexpression that is repeated is written once, so that this takes as long as the formula is
+    large in memory, and no maximum is compared with its parts, which takes longer than all else.
+    """
+    import sympy
+
+    known: dict[Any, Any] = dict(places)
+
+    def write(part: Any) -> Any:
+        if part not in known:
+            parts = [write(one) for one in part.args]
+            if all(new is old for new, old in zip(parts, part.args, strict=True)):
+                known[part] = part
+            elif isinstance(part, sympy.Max | sympy.Min) and not all(x.is_number for x in parts):
+                known[part] = part.func(*parts, evaluate=False)
+            else:
+                known[part] = part.func(*parts)
+        return known[part]
+
+    found: sympy.Expr = write(expression)
+    return found
+
+
 def as_expressions(argument: str, given: "Mapping[str, Any]") -> "dict[str, sympy.Expr]":
     """Return formulas by name, or raise TypeError with the argument and the name."""
     found = mapping(argument, given).items()

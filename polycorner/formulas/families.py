@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner.checks import about, names, reals, refuse, whole
-from polycorner.formulas.expressions import as_expression, kinks
+from polycorner.formulas.expressions import as_expression, kinks, substitute
 from polycorner.formulas.programs import Program
 from polycorner.formulas.shapes import Binding, bind, digest, shared_kernel
 from polycorner.formulas.translate import compile_expressions
@@ -204,7 +204,8 @@ class Family(Checked):
         written: dict[str, sympy.Expr] = {}
 
         def expand(e: "sympy.Expr") -> "sympy.Expr":
-            return e.xreplace({s: written[s.name] for s in e.free_symbols if s.name in written})
+            found = {s: written[s.name] for s in e.free_symbols if s.name in written}
+            return substitute(e, found)
 
         for definition, e in definitions.items():
             written[definition] = expand(e)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from polycorner import checks
 from polycorner.checks import reals
 from polycorner.formulas.bundles import Bundle
-from polycorner.formulas.expressions import as_expression
+from polycorner.formulas.expressions import as_expression, substitute
 from polycorner.formulas.families import Family
 from polycorner.formulas.periodicity import check_function
 from polycorner.kinds import checked
@@ -239,9 +239,8 @@ class SmoothFunction(Value):
             name: sympy.Symbol(self.manifold.names[i], real=True)
             for name, i in zip(self.family.variables, self.reads, strict=True)
         }
-        return formal.xreplace(
-            {s: renamed[s.name] for s in formal.free_symbols if s.name in renamed}
-        )
+        found = {s: renamed[s.name] for s in formal.free_symbols if s.name in renamed}
+        return substitute(formal, found)
 
     @property
     def parameter_values(self) -> dict[str, float]:
@@ -345,6 +344,5 @@ def with_numbers(function: SmoothFunction, shared: Container[str] = ()) -> "symp
 
     own = {p: value for p, value in function.parameter_values.items() if p not in shared}
     written = function.expression
-    return written.xreplace(
-        {s: sympy.Float(own[s.name]) for s in written.free_symbols if s.name in own}
-    )
+    numbers = {s: sympy.Float(own[s.name]) for s in written.free_symbols if s.name in own}
+    return substitute(written, numbers)

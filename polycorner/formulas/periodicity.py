@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from polycorner.formulas.expressions import announce
+from polycorner.formulas.expressions import announce, substitute
 from polycorner.formulas.operations import OPERATIONS
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT
@@ -41,7 +41,7 @@ def _check_even(function: Any) -> None:
         quaternion = manifold.symbols[factor.at]
         if not factor.turns or expression.free_symbols.isdisjoint(quaternion):
             continue
-        opposite = expression.xreplace({x: -x for x in quaternion})
+        opposite = substitute(expression, {x: -x for x in quaternion})
         if opposite == expression:
             continue
         steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (SAMPLES, manifold.size))
@@ -127,7 +127,7 @@ def _evaluator(
     import sympy
 
     fixed = {s: parameters[s.name] for s in expression.free_symbols if s.name in parameters}
-    function = sympy.lambdify(symbols, expression.xreplace(fixed), "numpy")
+    function = sympy.lambdify(symbols, substitute(expression, fixed), "numpy")
 
     def values(places: Array) -> Array:
         with np.errstate(all="ignore"):

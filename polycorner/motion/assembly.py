@@ -24,7 +24,7 @@ from polycorner.motion.placements import (
 )
 from polycorner.motion.scenes import Scene, overlapping
 from polycorner.motion.system import System, leapfrog_limit
-from polycorner.motion.ties import Tie, compiled_ties, described_tie
+from polycorner.motion.ties import Tie, compiled_ties, described_tie, followers
 from polycorner.spaces.manifold import Array
 from polycorner.values import cached_property
 
@@ -110,14 +110,13 @@ class Assembly(MechanicalSystem):
             whole(f"count of {name!r}", count[name], least=1)
             if one.count != 1 or one.between is not None:
                 refuse("kinds", f"one body as {name!r}, counts and contacts apart", one.count)
-            if one.rheonomic:
-                refuse("kinds", f"no equations with the time for {name!r}", [*one.rheonomic])
             if one.impact != next(iter(kinds.values())).impact:
                 refuse("kinds", f"the same law of impact for {name!r} as for others", one.impact)
             if {*one.substrate.values()} != {*next(iter(kinds.values())).substrate.values()}:
                 refuse("kinds", f"the same substrate for {name!r} as for others", one.substrate)
-            if self.ties and one.exits:
-                refuse("exits", "none in a system whose bodies have ties", dict(one.exits))
+            if one.exits and (self.ties or any(kind.rheonomic for kind in kinds.values())):
+                expected = "none in a system whose bodies have ties or equations with the time"
+                refuse("exits", expected, dict(one.exits))
         object.__setattr__(self, "kinds", dict(kinds))
         object.__setattr__(self, "count", {name: int(count[name]) for name in kinds})
         self._order_pairs()
@@ -159,7 +158,10 @@ class Assembly(MechanicalSystem):
         first = next(iter(own.values()))
         counted = [(self.kinds[name].manifold, n) for name, n in self.count.items()]
         every = SeveralKinds(own, between, first.period, first.substrate_speed, impact=first.impact)
-        return replace(every, ties=compiled_ties(self.ties, counted, every.names))
+        ties = [*self.ties]
+        for kind, *at in zip(self.kinds.values(), every.starts, every.starts[1:], strict=False):
+            ties += followers(kind.rheonomic, range(*at))
+        return replace(every, ties=compiled_ties(ties, counted, every.names))
 
     def _kind(self, name: str) -> IdenticalBodies:
         """Return the bodies of one kind, whose position is that of all pairs that it is in."""
@@ -170,7 +172,7 @@ class Assembly(MechanicalSystem):
             refuse("position", f"up to three coordinates of {name!r}", chosen)
         position = position_of(kind.manifold, chosen, kind.substrate, several=bool(chosen))
         return replace(
-            kind.bodies,
+            (replace(kind, rheonomic={}) if kind.rheonomic else kind).bodies,
             count=self.count[name],
             contacts=None if family is None else family.compiled(kind.manifold),
             position=position,

@@ -57,6 +57,7 @@ class Attraction(Checked):
         import sympy
 
         gap = as_expression("gap", gap)
-        closed = self.force * (gap - self.range / 2)
-        near = -self.force * self.range / 2 * (1 - gap / self.range) ** 2
-        return sympy.Piecewise((closed, gap < 0), (near, gap < self.range), (0, True))
+        # Of one maximum, so that the slope where the gap closes is the force, however it is taken.
+        open_ = sympy.Max(gap, 0, evaluate=gap.is_number)
+        near = sympy.Max(1 - open_ / self.range, 0, evaluate=gap.is_number)
+        return self.force * (gap - open_) - self.force * self.range / 2 * near**2

@@ -54,7 +54,7 @@ from polycorner.motion.placements import (
 from polycorner.motion.scenes import Scene, overlapping
 from polycorner.motion.stiffness import PlacedKind, tied_square
 from polycorner.motion.tie_forms import Ties
-from polycorner.motion.ties import Tie, compiled_ties, described_tie
+from polycorner.motion.ties import Tie, compiled_ties, described_tie, followers
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.printing import Printed, Sheet, brief, facts, few, listed, number
 from polycorner.signatures import shown
@@ -253,9 +253,6 @@ class System(MechanicalSystem, Printed):
         object.__setattr__(self, "ties", tuple(self.ties))
         if self.ties and self.exits:
             refuse("exits", "none in a system whose bodies have ties", dict(self.exits))
-        if self.ties and self.rheonomic:
-            expected = "none beside ties, whose equations may have the time themselves"
-            refuse("rheonomic", expected, [*self.rheonomic])
 
     def _check_single(self, argument: str) -> None:
         given = getattr(self, argument)
@@ -284,6 +281,11 @@ class System(MechanicalSystem, Printed):
     def _normals(self) -> tuple[str, ...]:
         """Names of all normal forces: of contacts, then of equations."""
         return (*self.contacts, *self.polyhedron.equation_names, *self.rheonomic)
+
+    @property
+    def _pressing(self) -> set[str]:
+        """Names of the contacts and equations whose force is the load of friction."""
+        return {f.load for f in self.friction if isinstance(f.load, str)}
 
     @cached_property
     def followed(self) -> Family:
@@ -341,6 +343,10 @@ class System(MechanicalSystem, Printed):
     @cached_property
     def bodies(self) -> IdenticalBodies:
         """The bodies and their contacts, for the engine."""
+        if self.rheonomic and not self.exits and self.rheonomic.keys().isdisjoint(self._pressing):
+            # Ties are solved in fewer steps; they press on no friction of a body, and none leaves.
+            every = *self.ties, *followers(self.rheonomic, range(self.count))
+            return replace(self, rheonomic={}, ties=every).bodies
         friction = tuple(
             FrictionContact(f.name, len(f.slip), f.static, f.moving, gap, loads, f.kind)
             for f, gap, loads in zip(self.friction, self.owners, self.load_sources, strict=True)

@@ -1,6 +1,6 @@
 """Ties between two bodies, or of a body to the world: joints, limits, springs, drives."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from polycorner.formulas.functions import SmoothFunction
 from polycorner.formulas.programs import Program
 from polycorner.formulas.translate import compile_expressions
 from polycorner.kinds import check_fields
-from polycorner.motion.contacts import Friction, pair_coordinates, pair_velocities
+from polycorner.motion.contacts import PAIR, Friction, pair_coordinates, pair_velocities
 from polycorner.motion.formulation import TIME, degree
 from polycorner.motion.tie_forms import NO_TIES, WORLD, TieForm, TieFriction, Ties
 from polycorner.spaces.manifold import Manifold
@@ -181,6 +181,19 @@ def described_tie(tie: Tie, text: Callable[[Any], str] = written) -> dict[str, A
     return told
 
 
+def followers(equations: "Mapping[str, sympy.Expr]", bodies: Iterable[int]) -> list[Tie]:
+    """Return equations with the time of each of some bodies as ties to the world.
+
+    These have no name, so that rows have those of the equations.
+    """
+    import sympy
+
+    free = {s for e in equations.values() for s in e.free_symbols if s.name != TIME}
+    places = {s: sympy.Symbol(f"{s.name}{PAIR[0]}", real=True) for s in free}
+    rows = {name: e.xreplace(places) for name, e in equations.items()}
+    return [Tie((i,), "", rows) for i in bodies] if rows else []
+
+
 def ends_of(tie: Tie, total: int, numbers: Mapping[str, int]) -> tuple[int, int]:
     """Return the numbers of the bodies of a tie, -1 for the world; ``numbers`` are by name."""
     found = []
@@ -277,7 +290,7 @@ def compiled_ties(
         tuple(form),
         tuple(every),
         tuple(tuple(tie.parameters.values()) for tie in ties),
-        tuple(f"{tie.name}.{row}" for tie in ties for row in tie.rows),
+        tuple(f"{tie.name}.{row}" if tie.name else row for tie in ties for row in tie.rows),
         tuple(e for tie in ties for e in tie.restitutions),
         tuple(dict.fromkeys(ends for ends in apart if ends[1] != WORLD)),
     )

@@ -96,3 +96,55 @@ def test_turns_are_told_apart_by_a_point():
     assert not a.polyhedron.contains(a.point(joints={"hub": -THREE - 0.1}), tolerance=1e-9)
     one, two = (a.placed(q)["A"].parts[""].points for q in (once, twice))
     np.testing.assert_allclose(one, two, atol=1e-12)
+
+
+@pytest.mark.parametrize("kinds", [False, True])
+def test_turns_of_repeated_bodies_are_counted_by_their_angles(kinds):
+    """Two bars turn about a pin at half the relative rate each, and bounce off three turns."""
+    e, rate, first = 0.6, 20.0, 0.3
+    pin = {"pin": Hinge("A 1" if not kinds else "A", "A 2" if not kinds else "B", turn=0.1,
+                        limits=(-1.0, THREE))}  # fmt: skip
+    bodies = {"A": BAR, "B": BAR} if kinds else {"A": BAR}
+    count = {"A": 1, "B": 1} if kinds else 2
+    a = Arrangement(bodies)
+    system = a.system(count=count, joints=pin, restitution={"pin": e})
+    q = np.array([[0, 0, -math.tau], [0, 0, first + 0.1 - math.tau]])
+    v = np.array([[0, 0, -rate / 2], [0, 0, rate / 2]])
+    start = [{"A": x[:1], "B": x[1:]} if kinds else x for x in (q, v)]
+    path = simulate(system, system.state(*start), 1.5, 1e-3)
+    angles = path.q.reshape(-1, 2, 3)[:, :, 2]
+    hit = (THREE - first) / rate
+    exact = np.where(
+        path.times < hit, first + rate * path.times, THREE - e * rate * (path.times - hit)
+    )
+    assert angles[:, 1] - angles[:, 0] - 0.1 == pytest.approx(exact, abs=1e-6)
+    assert angles.sum(axis=1) == pytest.approx(angles[0].sum(), abs=1e-9)
+    (bounce,) = [event for event in path.events if event.contact == "pin.max"]
+    assert bounce.time == pytest.approx(hit, abs=1e-8)
+    q[1, 2] += THREE
+    with pytest.raises(ValueError, match=r"q: expected limit 'pin.max' .* not to be passed"):
+        system.state({"A": q[:1], "B": q[1:]} if kinds else q)
+
+
+def test_springs_and_gears_of_repeated_bodies_act_on_the_counted_angle():
+    """A rack goes by its pinion, that a spring turns back by two turns and a half."""
+    lead, stiff, start = 0.1, 3.0, 5 * math.pi
+    joints = {
+        "hub": Hinge("world", "wheel", limits=(-THREE, THREE)),
+        "way": Slider("world", "rack", axis=[1, 0], at=[0, 3]),
+        "teeth": Gear("hub", "way", lead),
+    }
+    a = Arrangement({"wheel": BAR, "rack": disc(0.2)}, joints=joints)
+    spring = {"spring": Spring("hub", stiffness=stiff)}
+    q = a.point(joints={"hub": start})
+    system = a.system(drives=spring, count={"wheel": 1, "rack": 1})
+    wheel = np.append(q[a.placements[0].at], start)  # the angle of a joint with space is counted
+    wheel[2] = start
+    path = simulate(
+        system, system.state({"wheel": [wheel], "rack": [q[a.placements[1].at]]}), 1, 1e-3
+    )
+    inertia = mass_of(BAR).inertia + mass_of(disc(0.2)).mass * lead**2
+    swing = start * np.cos(math.sqrt(stiff / inertia) * path.times)
+    np.testing.assert_allclose(path["wheel"].q[:, 0, 2], swing, atol=1e-3)
+    np.testing.assert_allclose(path["wheel"].q[:, 0, 3], swing, atol=1e-3)
+    np.testing.assert_allclose(path["rack"].q[:, 0, 0], lead * swing, atol=1e-4)

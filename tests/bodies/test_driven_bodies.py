@@ -284,6 +284,51 @@ def test_gears_share_a_torque_and_book_its_work(ratio):
     assert path.kinetic[-1] == pytest.approx(4.0 * turned, rel=1e-4)
 
 
+def test_a_differential_shares_a_torque_among_three_shafts():
+    """``w' = M^-1 (t - c p)`` with ``p = c M^-1 t / c M^-1 c``, as ``c w = 0``; no work is lost."""
+    ratio, further = -20 / 60, 80 / 60
+    wheels = {"A": disc(1.0), "B": disc(1.5), "C": disc(0.5)}
+    joints = {n.lower(): Hinge("world", n, at=[3 * k, 0]) for k, n in enumerate(wheels)}
+    joints["g"] = Gear("a", "b", ratio, 0.2, further={"c": further})
+    a = Arrangement(wheels, joints=joints)
+    system = a.system(drives={"m": Motor("a", 4.0), "n": Motor("c", -1.0)})
+    path = run(a, system, t_end=1.5)
+    torque, row = np.array([4.0, 0.0, -1.0]), np.array([-ratio, 1.0, -further])
+    mobility = 1 / np.array([mass_of(wheel).inertia for wheel in wheels.values()])
+    force = row @ (mobility * torque) / (row @ (mobility * row))
+    turned = mobility * (torque - row * force) * 1.5**2 / 2
+    start = a.joint_values(path.q[0, 0])
+    found = [coordinate(a, path, n)[-1] - start[n] for n in "abc"]
+    assert found == pytest.approx(turned, rel=1e-5)
+    # As that of any equation, along its gradient.
+    assert {n: f for _, n, f in path.touching[-1]}["g"] == pytest.approx(-force, rel=1e-5)
+    assert path.kinetic[-1] == pytest.approx(torque @ turned, rel=1e-4)
+
+
+def test_a_planet_rolls_on_its_sun_without_slipping():
+    """The points of both where they mesh have one velocity; the planet hangs on the carrier."""
+    sun, planet = 0.5, 0.25
+    axis, arm = [0, 0, 1], [sun + planet, 0, 0]
+    wheel = capsule([0, 0, -0.1], [0, 0, 0.1], 0.2)
+    bodies = {"sun": wheel, "carrier": capsule([0, 0, 2], [*arm[:2], 2], 0.1), "planet": wheel}
+    joints = {
+        "s": Hinge("world", "sun", axis=axis),
+        "c": Hinge("world", "carrier", axis=axis),
+        "p": Hinge("carrier", "planet", at=arm, axis=axis),
+        "teeth": Gear("s", "p", -sun / planet, further={"c": sun / planet}),
+    }
+    a = Arrangement(bodies, joints=joints)
+    system = a.system(drives={"m": Motor("s", 3.0), "n": Motor("c", 1.0)})
+    path = run(a, system, t_end=1.0)
+    turned = {n: np.unwrap(coordinate(a, path, n)) for n in "scp"}
+    rates = {n: np.gradient(x, path.times) for n, x in turned.items()}
+    at_sun = sun * rates["s"]
+    # The centre goes with the carrier, and the planet turns by what the carrier does, and p.
+    at_planet = (sun + planet) * rates["c"] - planet * (rates["c"] + rates["p"])
+    assert np.ptp(at_sun) > 0.1
+    np.testing.assert_allclose(at_planet, at_sun, atol=1e-5)
+
+
 @pytest.mark.parametrize("d", [2, 3])
 def test_friction_in_a_hinge_stops_it_and_holds_it(d):
     """``I w' = -t``; and less than ``t`` does not move it."""

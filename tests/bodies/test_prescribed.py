@@ -187,3 +187,17 @@ def test_states_that_do_not_follow_are_refused():
         System(Polyhedron(M, {"contact": Y}), VX**2 + VY**2, rheonomic={"contact": X - NOW})
     with pytest.raises(ValueError, match="rheonomic: expected a formula in coordinates"):
         System(Polyhedron(M, {"contact": Y}), VX**2 + VY**2, rheonomic={"p": NOW})
+
+
+@pytest.mark.parametrize("dt", [1e-3, 7e-3])
+def test_a_table_that_rises_at_a_constant_rate_meets_a_block_in_few_iterations(dt):
+    a = Arrangement(
+        {"table": capsule([-1, 0], [1, 0], 0.1), "block": disc(0.2)},
+        joints={"rail": Slider("world", "table", axis=[0, 1])},
+    )
+    system = a.system(drives={"lift": Prescribed("rail", NOW)})
+    q = a.point({"block": [0, 0.4]})
+    path = simulate(system, system.state(q, a.velocity(q, joints={"rail": 1.0})), 0.14, dt)
+    (made,) = path.events
+    assert (made.kind.name, made.time) == ("MADE", pytest.approx(0.1, abs=1e-8))
+    assert path.effort.islands < 4 * path.effort.steps

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from sympy import Abs, Max, Min, Piecewise, Rational, cos, exp, sin, sqrt, tan
 
 from polycorner import AllOf, AnyOf, Manifold, NonsmoothWarning, Polyhedron, SmoothFunction
+from polycorner.formulas.expressions import substitute
 from polycorner.polyhedra.groups import outermost
 
 M = Manifold.euclidean("x y")
@@ -186,3 +187,16 @@ def test_wrong_arguments_are_named(arguments, told):
     with pytest.raises(TypeError) as caught:
         SmoothFunction(**{"name": "f", "expression": X, "manifold": M} | arguments)
     assert str(caught.value) == told
+
+
+def test_substitution_is_that_of_sympy_however_often_parts_are_repeated():
+    x, y = X, Y
+    e = Max(x, y * sin(x)) + Piecewise((x, y > 0), (Min(x, 2), True))
+    places = {x: y + 1, y: x**2}
+    assert substitute(e, places) == e.xreplace(places)
+    assert substitute(e, {x: sympy.Integer(3), y: sympy.Integer(1)}) == e.subs({x: 3, y: 1})
+    folded, expected = x, P
+    for _ in range(8):
+        folded = cos(folded) * Max(folded, y, evaluate=False)
+        expected = cos(expected) * Max(expected, Q, evaluate=False)
+    assert substitute(folded, {x: P, y: Q}) == expected

@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from polycorner import Friction, Manifold, Polyhedron, System, velocities
 from polycorner.files.trajectories import load_trajectory, save_trajectory
 from polycorner.motion import (
+    Assembly,
     Checkpoint,
     ContactFamily,
     EventKind,
@@ -544,6 +545,59 @@ def test_loops_of_joints_are_known():
     assert len(springs(3).bodies.ties.components) == 1
 
 
+SWING = 0.3 + 0.2 * sp.sin(2 * time_symbol())
+
+
+def assembled(system):
+    """Return the same bodies as the only kind of an assembly."""
+    alone = replace(system, count=1, ties=())
+    return Assembly({"rod": alone}, {"rod": system.count}, ties=system.ties)
+
+
+@pytest.mark.parametrize("form", [lambda system: system, assembled])
+def test_tied_rods_that_follow_the_time_each_by_itself(form):
+    """The torques are those of Lagrange's equations for the two angles."""
+    now, t_end = time_symbol(), 1.0
+    angles, rates = sp.symbols("p q", real=True), sp.symbols("u w", real=True)
+    kinetic = potential = x = y = sp.S.Zero
+    for p, u in zip(angles, rates, strict=True):
+        middle = x + sp.sin(p) / 2, y - sp.cos(p) / 2
+        moving = [
+            sum(sp.diff(c, a) * w for a, w in zip(angles, rates, strict=True)) for c in middle
+        ]
+        kinetic += (sum(s**2 for s in moving) + u**2 / 12) / 2
+        potential += G * middle[1]
+        x, y = x + sp.sin(p), y - sp.cos(p)
+    given = dict.fromkeys(angles, SWING) | dict.fromkeys(rates, sp.diff(SWING, now))
+    torques = [
+        float(
+            (
+                sp.diff(sp.diff(kinetic, u).subs(given), now)
+                - sp.diff(kinetic - potential, p).subs(given)
+            ).subs(now, t_end)
+        )
+        for p, u in zip(angles, rates, strict=True)
+    ]
+    energy = sp.lambdify(now, (kinetic + potential).subs(given))
+
+    system = form(rods(2, rheonomic={"turn": A - SWING}))
+    q, rate = hanging([0.3, 0.3]), 0.4
+    way = 0.5 * rate * np.array([math.cos(0.3), math.sin(0.3)])
+    v = np.column_stack([np.outer([1, 3], way), [rate, rate]])
+    start = (q, v) if form is not assembled else ({"rod": q}, {"rod": v})
+    path = simulate(system, system.state(*start), t_end, 1e-3, solver=TIGHT)
+    turned = path.q.reshape(-1, 2, 3)[:, :, 2]
+    followed = sp.lambdify(now, SWING)(path.times)
+    np.testing.assert_allclose(turned, np.column_stack([followed] * 2), atol=1e-6)
+    gained = energy(t_end) - energy(0.0)
+    assert path.work["drive"][-1] == pytest.approx(gained, rel=1e-4)
+    found = {bodies: force for bodies, name, force in path.touching[-1] if name == "turn"}
+    # That of the last step is at its midpoint; the upper one bears what the lower one needs.
+    assert [found[0,], found[1,]] == pytest.approx(torques, rel=5e-3)
+    assert system.largest_step(path.last)[0] > 100  # nothing is left to swing
+    assert path.effort.islands < 3 * path.effort.steps
+
+
 MISTAKES = [
     (lambda: Tie((0, 0), "t"), "bodies: expected one body, or two different ones"),
     (lambda: Tie((0, 1, 2), "t"), "bodies: expected one body, or two different ones"),
@@ -560,7 +614,14 @@ MISTAKES = [
     (lambda: rods(2, ties=[Tie(1, "t", potential=time_symbol())]), "potential: expected a formula"),
     (lambda: rods(2, ties=[Tie(1, "t", forces={"x2": 1})]), "forces: "),
     (lambda: rods(2, exits={"x": 3.0}), "exits: expected none"),
-    (lambda: rods(2, rheonomic={"h": X - time_symbol()}), "rheonomic: expected none"),
+    (
+        lambda: rods(2, rheonomic={"h": A - time_symbol()}).state(hanging([0.1, 0.1])),
+        "q: expected equation 'h' of body 0 to hold at the time 0; its value is 0.1",
+    ),
+    (
+        lambda: rods(1, rheonomic={"h": A - time_symbol()}).state(hanging([0.0])),
+        "v: expected velocities that follow equation 'h'",
+    ),
     (lambda: rods(2).state([[1, 0, 0], [2, 0, 0]]), "q: expected equation 'hook.x' of body 0"),
     (
         lambda: rods(2).state(hanging([0.2, 0.1]), [[0, 0, 1], [0, 0, 1]]),
