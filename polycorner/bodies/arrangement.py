@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.bodies.centres import chart_of
 from polycorner.bodies.checking import angular, check_together, named
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.constraints import orients
@@ -24,6 +25,7 @@ from polycorner.bodies.dynamics import (
     rubbing_hulls,
     touching_twins,
 )
+from polycorner.bodies.frames import Frame
 from polycorner.bodies.joints import WORLD, AnyJoint
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
@@ -217,14 +219,25 @@ class Arrangement(Checked, Printed):
         return min(part.thickness for body in self.named.values() for part in body.parts.values())
 
     @cached_property
+    def frames(self) -> dict[str, Frame]:
+        """The kind of coordinates of each body."""
+        held = {
+            name: any(orients(joint, name, body) for joint in self.joints.values())
+            for name, body in self.named.items()
+        }
+        return {
+            name: frame_of(body, "all" if held[name] else self.orientations)
+            for name, body in self.named.items()
+        }
+
+    @cached_property
     def placements(self) -> tuple[Placement, ...]:
         """The coordinates of each body, and where they stand."""
         found, start = [], 0
         turns = self.lattice.turns([*self.named.values()], [*self.fixed.values()])
         periods = (self.lattice.lengths * turns).tolist()
         for name, body in self.named.items():
-            held = any(orients(joint, name, body) for joint in self.joints.values())
-            frame = frame_of(body, "all" if held else self.orientations)
+            frame = self.frames[name]
             turn = self.scale / max(body.size, self.scale)
             units = self.scale, turn, self.unit
             factor = frame.manifold(name, self.dimension, *units, periods)
@@ -389,6 +402,31 @@ class Arrangement(Checked, Printed):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
+        options = {name: value for name, value in locals().items() if name != "self"}
+        found = self._moved_by(**options)
+        object.__setattr__(found, "chart", chart_of(self, options, rubs=bool(found.bodies.rubbing)))
+        return found
+
+    def _moved_by(  # noqa: PLR0913 - all are options
+        self,
+        *,
+        gravity: Any,
+        density: float,
+        masses: Any,
+        friction: Any,
+        rolling: Any,
+        restitution: Any,
+        impact: str,
+        exits: Any,
+        count: Any,
+        joints: Any,
+        drives: Any,
+        forces: Any,
+        rates: Any,
+        limits: Any,
+        nonholonomic: Any,
+    ) -> System | Assembly:
+        """Return the mechanical system of the bodies in their own coordinates."""
         limited = self._limited(count, rates, limits, nonholonomic)
         if isinstance(count, Mapping):
             check_width(self.lattice, [*self.named.values()], [*self.fixed.values()])
