@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from polycorner import checks
+from polycorner.bodies.centres import chart_of
 from polycorner.bodies.checking import angular, check_together, named
 from polycorner.bodies.congruences import Congruences
 from polycorner.bodies.constraints import orients
 from polycorner.bodies.drives import Drive, rate_of
+from polycorner.bodies.frames import Frame
 from polycorner.bodies.joints import AnyJoint
 from polycorner.bodies.kernels import together
 from polycorner.bodies.lattices import Lattice, lattice
@@ -202,14 +204,25 @@ class Arrangement(Checked, Printed):
         return min(part.thickness for body in self.named.values() for part in body.parts.values())
 
     @cached_property
+    def frames(self) -> dict[str, Frame]:
+        """The kind of coordinates of each body."""
+        held = {
+            name: any(orients(joint, name, body) for joint in self.joints.values())
+            for name, body in self.named.items()
+        }
+        return {
+            name: frame_of(body, "all" if held[name] else self.orientations)
+            for name, body in self.named.items()
+        }
+
+    @cached_property
     def placements(self) -> tuple[Placement, ...]:
         """The coordinates of each body, and where they stand."""
         found, start = [], 0
         turns = self.lattice.turns([*self.named.values()], [*self.fixed.values()])
         periods = (self.lattice.lengths * turns).tolist()
         for name, body in self.named.items():
-            held = any(orients(joint, name, body) for joint in self.joints.values())
-            frame = frame_of(body, "all" if held else self.orientations)
+            frame = self.frames[name]
             turn = self.scale / max(body.size, self.scale)
             units = self.scale, turn, self.unit
             factor = frame.manifold(name, self.dimension, *units, periods)
@@ -375,9 +388,10 @@ class Arrangement(Checked, Printed):
         >>> path.v[-1].round(6).tolist()
         [[2.0, 0.0, -2.0]]
         """
-        laws = gravity, density, masses, friction, rolling, restitution, attraction, impact
-        more = exits, count, joints, drives, forces, rates, limits, nonholonomic
-        return system_of(self, Asked(*laws, *more))
+        options = {name: value for name, value in locals().items() if name != "self"}
+        found = system_of(self, Asked(**options))
+        object.__setattr__(found, "chart", chart_of(self, options, found))
+        return found
 
     @cached_property
     def symmetry(self) -> Symmetry:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from polycorner.motion.bodies import MovingBodies
+from polycorner.motion.charts import Chart
 from polycorner.motion.noise import Solver
 from polycorner.motion.scenes import Scene
 from polycorner.signatures import shown
@@ -64,7 +65,15 @@ class MechanicalSystem(Value, ABC):
 
     :class:`~polycorner.motion.system.System` is written in SymPy expressions; a model may derive
     from this class to bring formulas of its own.
+
+    Attributes
+    ----------
+    chart : Chart or None
+        Other coordinates in which motion is computed, if any.  An attribute and no field: systems
+        with other laws, which ``replace`` makes, do not take it over.
     """
+
+    chart: Chart | None = None
 
     @property
     @abstractmethod

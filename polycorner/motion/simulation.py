@@ -82,6 +82,7 @@ from polycorner.errors import SolverError
 from polycorner.interrupts import first_interrupt
 from polycorner.kinds import checked
 from polycorner.motion.bodies import IdenticalBodies, MovingBodies
+from polycorner.motion.charts import Chart
 from polycorner.motion.drifts import Drift
 from polycorner.motion.formulation import mass_and_forces
 from polycorner.motion.mechanics import MechanicalSystem, Memory, State
@@ -179,7 +180,7 @@ def simulate(
     begin = real("state.time", state.time, unit="s")
     end = real("t_end", t_end, least=begin, most=LONGEST, unit="s")
     steps, step = _steps(end - state.time, real("dt", dt, above=0, unit="s"))
-    engine = start(system, state, step, noise=noise, solver=solver)
+    engine, chart = start(system, state, step, noise=noise, solver=solver), _chart(system, noise)
     stride = max(1, steps // FRAMES) if every is None else whole("every", every, least=1)
     recorder, saved = _recorder(engine), None
     if checkpoint is not None:
@@ -192,13 +193,25 @@ def simulate(
         try:
             rate = _follow(recorder, steps, stride, saved, progress)
         except SolverError as error:
-            error.state = _present(engine, state)
+            error.state = _present(engine, state, chart)
             raise
     arrays = {name: array.copy() for name, array in engine.save().items()}
     memory = Memory(system, engine.start, engine.time, engine.dt, arrays)
-    last = replace(_present(engine, state), memory=memory)
+    last = replace(_present(engine, state, chart), memory=memory)
     run = {"noise": noise, "solver": solver, "every": stride, "t_end": end, "last": last}
-    return recorder.trajectory(system, **run, steps_per_second=rate)
+    path = recorder.trajectory(system, **run, steps_per_second=rate)
+    if chart is None:
+        return path
+    q, v = chart.outward(path.q, path.v, state.q.size)
+    return replace(path, q=q, v=v)
+
+
+def _chart(system: MechanicalSystem, noise: Noise | None) -> Chart | None:
+    """Return the coordinates in which a motion is computed, if they are not those of the system.
+
+    Random forces are those on coordinates of the system.
+    """
+    return None if noise is not None and noise.kicks else system.chart
 
 
 def _recorder(engine: Any) -> "Recorder":
@@ -337,7 +350,8 @@ def start(
     bodies.check_places(*placed, dt)
     if not isinstance(system, Drift):
         _check_mass(bodies, *placed)
-    memory = state.memory if _goes_on(system, state, dt) else None
+    chart = _chart(system, noise)
+    memory = state.memory if _goes_on(system, chart, state, dt) else None
     if memory is None:  # what goes on was let in; bodies that have left stand where others may be
         system.check_placement(state.q)
         largest, why = system.largest_step(state)
@@ -354,6 +368,9 @@ def start(
     names("scatter", noise.scatter, sorted(known))
     if noise.kicks and noise.kick_time:
         real("kick_time", noise.kick_time, least=dt / MOST_KICKS, unit="s")
+    if chart is not None:
+        bodies = chart.system.bodies
+        placed = tuple(map(bodies.padded, chart.inward(state.q, state.v)))
     if isinstance(bodies, IdenticalBodies) and bodies.body.formulation.is_paced:
         law = bodies.body.formulation
         paced = replace(bodies.body, parameters=law.at(bodies.body.parameters, step=dt))
@@ -389,15 +406,21 @@ def _start_drift(
     return engine
 
 
-def _goes_on(system: MechanicalSystem, state: State, dt: float) -> bool:
+def _goes_on(system: MechanicalSystem, chart: Chart | None, state: State, dt: float) -> bool:
     """Whether a state is the last of a run of the same system with the same step, unchanged."""
     memory = state.memory
     if memory is None or memory.system is not system or memory.dt != dt:
         return False
     known, bodies = memory.arrays, system.bodies
-    given = bodies.padded(state.q), bodies.padded(state.v), np.ravel(state.sticking)
-    kept = known["q"], known["v"], known["sticks"]
-    return state.time == memory.end and all(map(np.array_equal, given, kept))
+    given = np.ravel(state.q), np.ravel(state.v), np.ravel(state.sticking)
+    kept = *_told(bodies, chart, known["q"], known["v"]), known["sticks"]
+    return state.time == memory.end and all(map(np.array_equal, given, map(np.ravel, kept)))
+
+
+def _told(bodies: MovingBodies, chart: Chart | None, q: Array, v: Array) -> tuple[Array, Array]:
+    """Return coordinates and velocities of a system from those in an engine."""
+    q, v = bodies.unpadded(q), bodies.unpadded(v)
+    return (q, v) if chart is None else chart.outward(q, v, q.size)
 
 
 def _check_mass(bodies: MovingBodies, q: Array, v: Array) -> None:
@@ -436,15 +459,16 @@ def step(system: MechanicalSystem, state: State, dt: float) -> State:
     if effort.unconverged:
         msg = f"the step was not solved: its residual is {effort.residual:.3g} of the speeds in it"
         raise SolverError(msg)
-    return _present(engine, state)
+    return _present(engine, state, _chart(system, None))
 
 
-def _present(engine: "Engine", like: State) -> State:
+def _present(engine: "Engine", like: State, chart: Chart | None) -> State:
     """Return the present state, in the shape of another."""
-    motion, bodies = engine.motion, engine.bodies
+    motion = engine.motion
+    q, v = _told(engine.bodies, chart, motion.q, motion.v)
     return State(
         engine.time,
-        bodies.unpadded(motion.q).reshape(like.q.shape),
-        bodies.unpadded(motion.v).reshape(like.v.shape),
+        q.reshape(like.q.shape),
+        v.reshape(like.v.shape),
         (motion.sticks != 0).reshape(like.sticking.shape),
     )

@@ -187,6 +187,9 @@ def solve_matrix(A, x, n, K, row_start, columns):
 def solve_island_matrix(model, matrix, n):
     """Solve the system of an island for ``matrix.vector`` in place; return if it has been."""
     x, K = matrix.vector, model.lanes
+    # The derivative by the time stands in a row of its own: its velocity is given, no unknown.
+    for p in range(n if model.timed else ZERO):
+        x[p * K + model.dimension] = 0.0
     return solve_matrix(matrix.entries, x, n, K, matrix.row_start, matrix.columns)
 
 
