@@ -188,8 +188,8 @@ def test_gravity_along_a_periodic_direction():
 
 
 def test_what_is_refused():
-    narrow = r"period: expected lengths of at least 0.444444 for repeated bodies .* 0.2 apart"
-    with pytest.raises(ValueError, match=narrow + "; got 0.4"):
+    narrow = r"period: expected lengths of at least 0.444444 for bodies that touch up to 0.2 apart"
+    with pytest.raises(ValueError, match=narrow + ".*; got 0.4"):
         Arrangement([disc(0.1)], period=[1, 0.4]).system(count=2)
     with pytest.raises(ValueError, match=r"period: .* at least 1\.33333 "):
         Arrangement([disc(0.1)], fixed={"F": disc(0.5)}, period=[1, 1]).system(count=2)
