@@ -198,7 +198,7 @@ class Chain:
                 written[dotted(name)] = change
                 old, new = symbols([name, dotted(name)])
                 rates[old] = new
-        return written, pose | {dotted(name): rate(sympy.sympify(e)) for name, e in pose.items()}
+        return written, pose | {dotted(name): rate(sympy.S.Zero + e) for name, e in pose.items()}
 
     def function(
         self, manifold: Manifold, family: Family, parameters: list[float], label: str, member: str

@@ -163,6 +163,7 @@ CASES = {
     "Motor.speed": ("speed", lambda e, _: Motor("J", speed=e, limit=1.0)),
     "Prescribed.motion": ("motion", lambda e, _: Prescribed("J", e, limit=1.0)),
     "Robot.system.torques": ("torques", lambda e, _: hinged().system(torques={"hinge": e})),
+    "Robot.system.motions": ("motions", lambda e, _: hinged().system(motions={"hinge": e})),
     "Robot.system.limits": ("limits", lambda e, _: hinged().system(limits={"f": e})),
     "Robot.system.nonholonomic": (
         "nonholonomic",
