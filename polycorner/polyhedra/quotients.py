@@ -189,7 +189,7 @@ class Quotient:
 
     def orbit(self, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit through a point, ``(g, n)``."""
-        return self.symmetry.directions(self.manifold, q)
+        return self.symmetry.directions_at(self.manifold, q)
 
     def displacement(self, p: Array, q: Array) -> Array:
         """Return the displacement from one continuous orbit to another, by the invariants."""

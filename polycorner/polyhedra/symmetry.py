@@ -114,7 +114,10 @@ class Symmetry(Checked):
     @checked
     def directions(self, manifold: Manifold, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit, ``(g, n)``."""
-        q = _placed("q", q, manifold)
+        return self.directions_at(manifold, _placed("q", q, manifold))
+
+    def directions_at(self, manifold: Manifold, q: Array) -> Array:
+        """Return :meth:`directions` at a point that is one: nothing is checked here."""
         if self.tangents is not None:
             return np.asarray(self.tangents(q), dtype=np.float64) / manifold.scale_array
         if manifold not in self._compiled:
