@@ -1,7 +1,7 @@
 """The rooms of this checkout beside those of another one, alternating: ratios of processor times.
 
-``python benchmarks/bench_against.py FOLDER``; ``--cases`` names some of them, ``--rounds`` says how
-often.  Every measurement is a process of its own, in which the package of its folder is imported,
+``python benchmarks/bench_against.py FOLDER``, or without a folder this one alone; ``--cases`` names
+some of them, ``--rounds`` says how often.  Every measurement is a process of its own, in which the package of its folder is imported,
 on one thread.  What is compiled is compiled before, but for first answers, whose caches are empty.
 Both checkouts run the same lines, of public names that both have; for the engine of motion see
 ``bench_engine.py``.
@@ -118,24 +118,27 @@ def measured(root: Path, case: str) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="another checkout")
+    parser.add_argument("folder", nargs="?", type=Path, help="another checkout")
     parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES), metavar="CASE")
     parser.add_argument("--rounds", type=int, default=5)
     given = parser.parse_args()
-    roots = {"this": ROOT, "other": given.folder.resolve()}
+    roots = {"this": ROOT} | ({"other": given.folder.resolve()} if given.folder else {})
     figures: dict[str, dict[str, Any]] = {}
     for case in given.cases:
         times: dict[str, list[float]] = {name: [] for name in roots}
         for k in range(given.rounds):
             for name in [*roots][:: 1 if k % 2 else -1]:  # neither always follows the other
                 times[name].append(measured(roots[name], case))
-        ratios = [a / b for a, b in zip(times["this"], times["other"], strict=True)]
         figures[case] = {
-            **{f"{name}, ms": float(f"{1e3 * min(taken):.4g}") for name, taken in times.items()},
-            "this over other": round(statistics.median(ratios), 2),
-            "from": round(min(ratios), 2),
-            "to": round(max(ratios), 2),
+            f"{name}, ms": float(f"{1e3 * min(taken):.4g}") for name, taken in times.items()
         }
+        if given.folder:
+            ratios = [a / b for a, b in zip(times["this"], times["other"], strict=True)]
+            figures[case] |= {
+                "this over other": round(statistics.median(ratios), 2),
+                "from": round(min(ratios), 2),
+                "to": round(max(ratios), 2),
+            }
         print(case, figures[case], flush=True)
     keys = list(next(iter(figures.values())))
     print_table(
