@@ -1,10 +1,10 @@
 """The rooms of this checkout beside those of another one, alternating: ratios of processor times.
 
 ``python benchmarks/bench_against.py FOLDER``, or without a folder this one alone; ``--cases`` names
-some of them, ``--rounds`` says how often.  Every measurement is a process of its own, in which the package of its folder is imported,
-on one thread.  What is compiled is compiled before, but for first answers, whose caches are empty.
-Both checkouts run the same lines, of public names that both have; for the engine of motion see
-``bench_engine.py``.
+some of them, ``--rounds`` says how often.  Every measurement is a process of its own, in which the
+package of its folder is imported, on one thread.  What is compiled is compiled before, but for
+first answers, whose caches are empty.  Both checkouts run the same lines, of public names that both
+have; for the engine of motion see ``bench_engine.py``.
 """
 
 import argparse
