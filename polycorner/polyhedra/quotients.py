@@ -14,7 +14,7 @@ from polycorner.polyhedra.cones import independent_rows, null_space, unit_rows
 from polycorner.polyhedra.equations import independent_equations
 from polycorner.polyhedra.polyhedron import Polyhedron
 from polycorner.polyhedra.strata import distances, evaluated, local_pieces
-from polycorner.polyhedra.symmetry import Symmetry
+from polycorner.polyhedra.symmetry import Symmetry, orbit_directions
 from polycorner.spaces.manifold import Array, Manifold
 from polycorner.tolerances import DEFAULT, Tolerances
 from polycorner.values import Checked, Value, cached_property
@@ -189,7 +189,7 @@ class Quotient:
 
     def orbit(self, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit through a point, ``(g, n)``."""
-        return self.symmetry.directions_at(self.manifold, q)
+        return orbit_directions(self.symmetry, self.manifold, q)
 
     def displacement(self, p: Array, q: Array) -> Array:
         """Return the displacement from one continuous orbit to another, by the invariants."""

@@ -114,16 +114,7 @@ class Symmetry(Checked):
     @checked
     def directions(self, manifold: Manifold, q: Array) -> Array:
         """Return the scaled tangent vectors of the orbit, ``(g, n)``."""
-        return self.directions_at(manifold, _placed("q", q, manifold))
-
-    def directions_at(self, manifold: Manifold, q: Array) -> Array:
-        """Return :meth:`directions` at a point that is one: nothing is checked here."""
-        if self.tangents is not None:
-            return np.asarray(self.tangents(q), dtype=np.float64) / manifold.scale_array
-        if manifold not in self._compiled:
-            self._compiled[manifold] = [vector_field(manifold, field) for field in self.fields]
-        vectors = [[f.value(q) for f in field] for field in self._compiled[manifold]]
-        return np.array(vectors).reshape(-1, manifold.size) / manifold.scale_array
+        return orbit_directions(self, manifold, _placed("q", q, manifold))
 
     @checked
     def displacement(self, manifold: Manifold, p: Array, q: Array) -> Array:
@@ -178,6 +169,17 @@ class Symmetry(Checked):
             for element in self.group
             if self.separation(manifold, element.apply(p), q) <= tolerance
         ]
+
+
+def orbit_directions(symmetry: Symmetry, manifold: Manifold, q: Array) -> Array:
+    """Return :meth:`Symmetry.directions` at a point that is one: nothing is checked here."""
+    if symmetry.tangents is not None:
+        return np.asarray(symmetry.tangents(q), dtype=np.float64) / manifold.scale_array
+    known = symmetry._compiled  # noqa: SLF001 - of this file
+    if manifold not in known:
+        known[manifold] = [vector_field(manifold, field) for field in symmetry.fields]
+    vectors = [[f.value(q) for f in field] for field in known[manifold]]
+    return np.array(vectors).reshape(-1, manifold.size) / manifold.scale_array
 
 
 def _placed(argument: str, given: Array, manifold: Manifold) -> Array:
