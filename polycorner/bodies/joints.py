@@ -289,7 +289,7 @@ class Gear(Checked):
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """By these names those of the sum that is :attr:`phase`, of the second one 1."""
+        """By these names those of the sum that is ``phase``, of the second one 1."""
         return {self.first: -self.ratio, **{n: -x for n, x in self.further.items()}, self.second: 1}
 
 
