@@ -49,6 +49,8 @@ def assembly(
     """
     kinds = [p.name for p in alone]
     checks.names("count", checks.mapping("count", count), kinds)
+    for name, number in count.items():
+        checks.whole(f"count of {name!r}", number, least=1)
     for argument in ("masses", "forces"):
         checks.names(argument, checks.mapping(argument, some[argument]), kinds)
     coordinates = [name for p in alone for name in p.manifold.names]

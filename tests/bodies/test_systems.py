@@ -335,6 +335,8 @@ def masses(mass, centre, inertia):
         (on_the_ground(friction=-1, count=2), ValueError, "friction"),
         (on_the_ground(count=0), ValueError, "count"),
         (system(count=2), ValueError, "count: expected 1, or numbers by name"),
+        (system(count={"1": "x", "2": 1}), TypeError, "count of '1': expected a whole number >= 1"),
+        (system(count={"1": 0, "2": 1}), ValueError, "count of '1': expected a whole number >= 1"),
         (masses(0, [0, 0], 1), ValueError, "mass"),
         (masses(1, [0, 0], 0), ValueError, "inertia"),
         (masses(1, [0, 0, 0], [1, 1, 2.1]), ValueError, "inertia"),
